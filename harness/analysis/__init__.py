@@ -1,0 +1,1 @@
+"""How far apart sources are, and for which q. Knows no engine, only placements."""

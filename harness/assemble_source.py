@@ -1,0 +1,194 @@
+"""One source's part of the report: its verdict at every frame, statistics, traits, noise class, reproducer."""
+
+from __future__ import annotations
+
+from harness.analysis.compare import Comparison
+from harness.analysis.noise import NoiseClass, classify
+from harness.analysis.statistics import Stream
+from harness.analysis.verdict import FAILING, judge
+from harness.description.configurations import ConfigurationSet
+from harness.engines.base import Trait
+from harness.engines.registry import adapter_of
+from harness.errors import CrosscheckError
+from harness.report import document as doc
+from harness.results import Results
+from harness.sources import Bound, Participant, deviation_on_file, pair_tolerance
+
+
+def assemble_source(results: Results, participant: Participant) -> doc.Source:
+    """The report entry of one participant."""
+    planned, bound = participant.planned, participant.bound
+    reference = results.participants[0]
+    tolerance = pair_tolerance(planned, reference.planned)
+    part = doc.Source(
+        name=planned.name,
+        required=planned.required,
+        reference=participant is reference,
+        status=participant.status,
+        verdict="failed" if participant.status == "failed" else "not run",
+        reason=participant.reason,
+        install=participant.install,
+        tolerance=doc.Tolerance(position=tolerance[0], rotation=tolerance[1]),
+        traits=_traits(results, planned.name),
+    )
+    if bound is None:
+        return part
+    part = part.model_copy(update={"joints": list(bound.engine.joints), **_joint_notes(results, bound)})
+    if results.comparison is None:
+        why = "not compared: the reference did not run"
+        return part.model_copy(update={"status": "not run", "reason": why})
+    part = part.model_copy(update={"validity": _validity(results, results.comparison, participant, bound)})
+    if participant is reference:
+        valid = part.validity is None or part.validity.invalid == 0
+        return part.model_copy(update={"verdict": "reference" if valid else "invalid placements"})
+    return _judged(results, results.comparison, participant, bound, part)
+
+
+def _judged(
+    results: Results, comparison: Comparison, participant: Participant, bound: Bound, part: doc.Source
+) -> doc.Source:
+    """Add the frames, and the verdict that follows from them."""
+    reference = results.participants[0]
+    tolerance = pair_tolerance(participant.planned, reference.planned)
+    frames = [
+        _frame(results, comparison, participant.name, reference.name, index, tolerance)
+        for index, frame in enumerate(results.model.frames.frames)
+        if frame.name in bound.missing or comparison.position[participant.name].count[index]
+        or bound.view.slots[index] >= 0
+    ]  # fmt: skip
+    failing = [f for f in frames if f.verdict in FAILING]
+    invalid = part.validity is not None and part.validity.invalid > 0
+    worst = max(frames, key=lambda f: max(f.position.max / tolerance[0], f.rotation.max / tolerance[1]))
+    noise = classify(
+        max(f.position.max for f in frames), max(f.rotation.max for f in frames), comparison.reach
+    )
+    verdict = (
+        "invalid placements" if invalid
+        else "disagrees" if failing
+        else "agrees as accepted" if any(f.verdict == "accepted" for f in frames)
+        else "agrees"
+    )  # fmt: skip
+    return part.model_copy(
+        update={
+            "verdict": verdict,
+            "frames": frames,
+            "worst_frame": worst.frame,
+            "first_disagreeing_frame": failing[0].frame if failing else "",
+            "noise": noise.key,
+            "noise_text": noise.text,
+            "explained_by": _evidence(results, part.traits, noise),
+            "reproducer": _reproducer(results, participant.name),
+        }
+    )
+
+
+def _frame(
+    results: Results, comparison: Comparison, source: str, reference: str, index: int, tolerance: tuple[float, float]
+) -> doc.FrameResult:
+    frame = results.model.frames.frames[index]
+    position = _statistics(results, comparison.position[source], index)
+    rotation = _statistics(results, comparison.rotation[source], index)
+    on_file = deviation_on_file(results.model, source, reference, frame.name)
+    deviation = on_file[0] if on_file else None
+    # A frame that was never compared cannot agree: not one finite pair of placements was seen.
+    verdict = judge(position.max, rotation.max, tolerance, deviation) if position.count else "not compared"
+    return doc.FrameResult(
+        frame=frame.name,
+        verdict=verdict,
+        position=position,
+        rotation=rotation,
+        noise=classify(position.max, rotation.max, comparison.reach).key,
+        accepted=on_file
+        and doc.Accepted(
+            position=on_file[0].position, rotation=on_file[0].rotation, within=on_file[0].within, reason=on_file[1]
+        ),
+    )
+
+
+def _statistics(results: Results, stream: Stream, index: int) -> doc.Statistics:
+    count = int(stream.count[index])
+    return doc.Statistics(
+        count=count,
+        max=max(float(stream.max[index]), 0.0),
+        mean=stream.mean(index),
+        p50=stream.quantile(index, 0.50),
+        p95=stream.quantile(index, 0.95),
+        p99=stream.quantile(index, 0.99),
+        decades={str(k): v for k, v in stream.decades(index).items()},
+        worst=at(results.model.configurations, int(stream.argmax[index]), results.options.seed) if count else None,
+    )
+
+
+def at(configurations: ConfigurationSet, index: int, seed: int) -> doc.At:
+    """A configuration by its index, with its values."""
+    q = configurations.block(seed, index, index + 1)[0]
+    return doc.At(index=index, label=configurations.label(index), q=q.tolist())
+
+
+def _validity(results: Results, comparison: Comparison, participant: Participant, bound: Bound) -> doc.Validity:
+    seen = comparison.validity[participant.name]
+    first = seen.first
+    return doc.Validity(
+        checked=seen.checked,
+        invalid=seen.invalid,
+        residual=seen.residual,
+        first=at(results.model.configurations, first[0], results.options.seed) if first else None,
+        first_frame=bound.frames[first[1]] if first else "",
+    )
+
+
+def _traits(results: Results, source: str) -> list[doc.TraitNote]:
+    try:
+        traits: tuple[Trait, ...] = adapter_of(source).traits
+    except CrosscheckError:  # a broken adapter has none to show; its problem is the source's reason
+        return []
+    found = {finding.code for finding in results.model.findings}
+    return [
+        doc.TraitNote(
+            key=t.key, text=t.text, evidence=t.evidence, lint=t.lint or "", applies=t.lint is None or t.lint in found
+        )
+        for t in traits
+    ]
+
+
+def _joint_notes(results: Results, bound: Bound) -> dict[str, object]:
+    """What the engine was given for mimic followers, and which joints were held at zero."""
+    held = [j for j in bound.joint_map.held if j in bound.engine.joints]
+    followers = bound.joint_map.followers
+    if not followers:
+        return {"held": held}
+    passed = [j for j in followers if j in bound.engine.joints]
+    applied = [j for j in followers if j not in bound.engine.joints]
+    texts = []
+    if passed:
+        texts.append(f"passed multiplier * q + offset for {', '.join(passed)}")
+    if applied:
+        texts.append(f"the engine itself moves {', '.join(applied)}")
+    return {"held": held, "mimic": "; ".join(texts)}
+
+
+def _evidence(results: Results, traits: list[doc.TraitNote], noise: NoiseClass) -> list[str]:
+    """What is known about this engine or this URDF that would make a discrepancy of this class."""
+    evidence = [t.text for t in traits if t.applies and noise.key == "float32" and t.key.startswith("float32")]
+    if noise.key.startswith("pi-"):
+        cut = [f for f in results.model.findings if f.code == "truncated-pi"]
+        if cut:
+            evidence.append(f"the URDF writes pi short in {len(cut)} places: {cut[0].message}")
+        evidence += [s.why for s in results.model.suspects]
+    if noise.key == "model":
+        evidence += [t.text for t in traits if t.applies and t.lint]
+    return evidence
+
+
+def _reproducer(results: Results, source: str) -> doc.Reproducer | None:
+    found = results.reproduced.get(source)
+    if found is None:
+        return None
+    return doc.Reproducer(
+        frame=results.model.frames.frames[found.frame].name,
+        q=found.q.tolist(),
+        position=found.position,
+        rotation=found.rotation,
+        reference_placement=found.T_reference.tolist(),
+        source_placement=found.T_source.tolist(),
+    )

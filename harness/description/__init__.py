@@ -1,0 +1,1 @@
+"""What a robot is, read and validated: DH table, URDF, mapping, configurations. Knows no engine."""

@@ -1,0 +1,175 @@
+"""The frame-name mapping: which DH frame and which URDF link are one frame, and at what constant offset.
+
+Four kinds of entry (design: one table `[[frame]]` each):
+    dh + urdf                  the same frame under two names
+    dh + urdf + xyz/rpy        the URDF link at a declared constant offset from the DH frame
+    urdf + of + xyz/rpy        the URDF link at a declared constant offset from another entry
+    dh + urdf + rigid = true   on the same body; the offset is measured once and must stay constant
+An entry without `urdf` is compared among DH sources only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from harness.description.dh import DHTable
+from harness.description.urdf import Urdf
+from harness.description.values import Number, Strict, Transform, Vector3
+from harness.errors import MappingError, nearest
+from harness.se3 import Array
+
+Relation = Literal["identical", "declared", "rigid"]
+
+
+class FrameEntry(Strict):
+    """One `[[frame]]` as written."""
+
+    name: str = Field(min_length=1)
+    dh: int | str | None = None
+    urdf: str | None = None
+    of: str | None = None
+    xyz: Vector3 | None = None
+    rpy: Vector3 | None = None
+    rigid: bool = False
+
+    @model_validator(mode="after")
+    def _one_meaning(self) -> FrameEntry:
+        declared = self.xyz is not None or self.rpy is not None
+        if (self.dh is None) == (self.of is None):
+            raise ValueError("expected exactly one of 'dh' and 'of'")
+        if self.rigid and (declared or self.of is not None):
+            raise ValueError("'rigid' means the offset is measured: leave out xyz, rpy and of")
+        if self.of is not None and not declared:
+            raise ValueError("'of' needs the offset: xyz, rpy or both (zeros, if it is the same frame)")
+        if self.urdf is None and (self.rigid or self.of is not None):
+            raise ValueError("an entry with 'rigid' or 'of' needs 'urdf'")
+        return self
+
+    @property
+    def offset(self) -> Array:
+        """Declared offset as (4, 4); identity if none is."""
+        if self.xyz is None and self.rpy is None:
+            return np.eye(4)
+        return Transform(xyz=self.xyz or [0.0] * 3, rpy=self.rpy or [0.0] * 3).matrix()
+
+
+class JointEntry(Strict):
+    """One `[joints.NAME]`: q_urdf = sign * q[NAME] + sum(coupling[k] * q[k]) + offset; `urdf` defaults to NAME."""
+
+    urdf: str | None = None
+    sign: Literal[-1, 1] = 1
+    offset: Number = 0.0
+    coupling: dict[str, Number] = {}
+
+
+class FramesFile(Strict):
+    """frames.toml."""
+
+    frame: list[FrameEntry] = Field(min_length=1)
+    joints: dict[str, JointEntry] = {}
+
+    @field_validator("joints", mode="before")
+    @classmethod
+    def _short_form(cls, value: Any) -> Any:
+        """`elbow = "elbow_joint"` is short for `elbow = {urdf = "elbow_joint"}`."""
+        if isinstance(value, dict):
+            return {k: {"urdf": v} if isinstance(v, str) else v for k, v in value.items()}
+        return value
+
+
+@dataclass(frozen=True)
+class MappedFrame:
+    """A frame under one name: `T_base_name = T_base_dh @ offset`, and the link `urdf` is the same frame.
+
+    `offset` is None for a rigid frame until it has been measured.
+    """
+
+    name: str
+    dh: str
+    urdf: str | None
+    relation: Relation
+    of: str | None
+    offset: Array | None
+
+
+@dataclass(frozen=True)
+class FrameMap:
+    """All mapped frames in file order; `base` is the one in which every placement is expressed."""
+
+    frames: tuple[MappedFrame, ...]
+    base: MappedFrame
+
+
+def resolve_frames(file: FramesFile, table: DHTable, urdf: Urdf | None, path: Path) -> FrameMap:
+    """Check the entries against both descriptions. Raises MappingError naming the key and the nearest spelling."""
+    by_name: dict[str, int] = {}
+    taken: dict[tuple[str, str], int] = {}
+    frames: list[MappedFrame] = []
+    for i, entry in enumerate(file.frame):
+        key = f"frame[{i}]"
+        _once(by_name, entry.name, i, path, f"{key}.name", f"frame name {entry.name!r}")
+        if entry.urdf is not None:
+            if urdf is None:
+                raise MappingError("names a URDF link, but the model has no [urdf]", where=path, key=f"{key}.urdf")
+            if entry.urdf not in urdf.links:
+                raise MappingError(
+                    f"no link {entry.urdf!r} in {urdf.path.name}; {nearest(entry.urdf, urdf.links)}",
+                    where=path, key=f"{key}.urdf",
+                )  # fmt: skip
+            _once(taken, ("urdf", entry.urdf), i, path, f"{key}.urdf", f"link {entry.urdf!r}")
+        mapped = _resolve(entry, i, file, table, path)
+        if mapped.relation == "identical":
+            _once(taken, ("dh", mapped.dh), i, path, f"{key}.dh", f"DH frame {mapped.dh} without an offset")
+        frames.append(mapped)
+    return FrameMap(tuple(frames), _base(frames, table, path))
+
+
+def _once(seen: dict[Any, int], item: Any, i: int, path: Path, key: str, what: str) -> None:
+    if item in seen:
+        raise MappingError(f"{what} is mapped twice, first by frame[{seen[item]}]", where=path, key=key)
+    seen[item] = i
+
+
+def _resolve(entry: FrameEntry, i: int, file: FramesFile, table: DHTable, path: Path) -> MappedFrame:
+    """Follow `of` down to an entry with `dh`, composing the declared offsets."""
+    offset, current, seen = entry.offset, entry, [entry.name]
+    while current.of is not None:
+        target = next((e for e in file.frame if e.name == current.of), None)
+        if target is None:
+            hint = nearest(current.of, [e.name for e in file.frame])
+            raise MappingError(f"no frame {current.of!r} in this file; {hint}", where=path, key=f"frame[{i}].of")
+        if target.name in seen:
+            raise MappingError(f"frames refer to each other in a circle: {' -> '.join([*seen, target.name])}", where=path)
+        if target.rigid:
+            raise MappingError(
+                f"{target.name!r} is rigid, its own offset is not declared", where=path, key=f"frame[{i}].of",
+                hint="give this entry dh and rigid = true instead",
+            )  # fmt: skip
+        offset, current = target.offset @ offset, target
+        seen.append(current.name)
+    label = str(current.dh)
+    if label not in table.frames:
+        raise MappingError(
+            f"no DH frame {label!r}: expected base, 0 to {len(table.rows)}, or tool", where=path, key=f"frame[{i}].dh"
+        )
+    if entry.rigid:
+        return MappedFrame(entry.name, label, entry.urdf, "rigid", None, None)
+    declared = entry.of is not None or entry.xyz is not None or entry.rpy is not None
+    return MappedFrame(entry.name, label, entry.urdf, "declared" if declared else "identical", entry.of, offset)
+
+
+def _base(frames: list[MappedFrame], table: DHTable, path: Path) -> MappedFrame:
+    labels = ["base"] if not np.array_equal(table.base, np.eye(4)) else ["base", "0"]
+    for frame in frames:
+        if frame.relation == "identical" and frame.dh in labels:
+            return frame
+    raise MappingError(
+        f"expected an entry with dh = {' or '.join(repr(label) for label in labels)} and no offset: the base frame in which "
+        "placements are expressed",
+        where=path,
+    )

@@ -1,0 +1,172 @@
+"""The map from model joints to URDF joints, q_urdf = A q + b: names, sign, zero offset, coupling, and mimic followers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from harness.description.dh import DHTable
+from harness.description.frames import FrameMap, JointEntry
+from harness.description.urdf import MOVABLE, UNSUPPORTED, Urdf, UrdfJoint
+from harness.errors import MappingError, UrdfError, nearest
+from harness.se3 import Array
+
+
+@dataclass(frozen=True)
+class JointMap:
+    """Affine map from the model's q (N, n) to every movable joint of a description, by name.
+
+    names: (m,) joint names; A: (m, n); b: (m,) [rad or m]. `followers` are mimic joints, whose rows are already
+    multiplier * leader + offset; `held` are joints that no model joint moves: they stay at zero.
+    """
+
+    names: tuple[str, ...]
+    A: Array
+    b: Array
+    followers: tuple[str, ...] = ()
+    held: tuple[str, ...] = ()
+
+    def values(self, q: Array, joints: tuple[str, ...]) -> Array:
+        """Values of the named joints, (N, len(joints)). Raises KeyError for a joint not in the map."""
+        rows = [self.names.index(name) for name in joints if name in self.names]
+        if len(rows) != len(joints):
+            missing = next(name for name in joints if name not in self.names)
+            raise KeyError(f"no joint {missing!r}; {nearest(missing, self.names)}")
+        return q @ self.A[rows].T + self.b[rows]
+
+
+def identity_map(table: DHTable) -> JointMap:
+    """The joints of the model as they are: what DH sources take."""
+    n = len(table.joints)
+    return JointMap(table.joints, np.eye(n), np.zeros(n))
+
+
+def resolve_joints(
+    entries: Mapping[str, JointEntry], table: DHTable, urdf: Urdf, frames: FrameMap, path: Path
+) -> JointMap:
+    """Match model joints to URDF joints and check that the counts fit on the mapped chain.
+
+    Raises MappingError (unknown, doubled or unmatched joints) or UrdfError (floating or planar on the chain).
+    """
+    for name in entries:
+        if name not in table.joints:
+            raise MappingError(f"no joint {name!r} in dh.csv; {nearest(name, table.joints)}", where=path, key=f"joints.{name}")
+    rows: dict[str, tuple[Array, float]] = {}
+    source: dict[str, str] = {}
+    for index, name in enumerate(table.joints):
+        entry = entries.get(name) or JointEntry()
+        joint = _target(name, entry, table, urdf, path)
+        if joint.name in source:
+            raise MappingError(
+                f"URDF joint {joint.name!r} is mapped twice: by {source[joint.name]!r} and {name!r}",
+                where=path, key=f"joints.{name}",
+            )  # fmt: skip
+        source[joint.name] = name
+        row = np.zeros(len(table.joints))
+        row[index] = entry.sign
+        for other, factor in entry.coupling.items():
+            if other not in table.joints or other == name:
+                hint = nearest(other, [j for j in table.joints if j != name])
+                raise MappingError(f"no other joint {other!r}; {hint}", where=path, key=f"joints.{name}.coupling")
+            row[table.joints.index(other)] += factor
+        rows[joint.name] = (row, entry.offset)
+    _check_chain(source, urdf, frames, path)
+    return _complete(rows, urdf, len(table.joints))
+
+
+def _target(name: str, entry: JointEntry, table: DHTable, urdf: Urdf, path: Path) -> UrdfJoint:
+    wanted = entry.urdf or name
+    joint = urdf.joints.get(wanted)
+    if joint is None:
+        hint = nearest(wanted, urdf.movable)
+        raise MappingError(f"no joint {wanted!r} in {urdf.path.name}; {hint}", where=path, key=f"joints.{name}")
+    if joint.type not in MOVABLE:
+        raise MappingError(f"URDF joint {joint.name!r} is {joint.type}, it takes no value", where=path, key=f"joints.{name}")
+    if joint.mimic is not None:
+        raise MappingError(f"URDF joint {joint.name!r} is a follower: map {joint.mimic.joint!r}", where=path, key=f"joints.{name}")
+    if (joint.type == "prismatic") != (table.kind(name) == "prismatic"):
+        raise MappingError(
+            f"{name!r} is {table.kind(name)} in dh.csv, {joint.name!r} is {joint.type} in the URDF", where=path, key=f"joints.{name}"
+        )
+    return joint
+
+
+def _check_chain(source: Mapping[str, str], urdf: Urdf, frames: FrameMap, path: Path) -> None:
+    """Every joint that moves a mapped link must be driven, and every model joint must move one."""
+    if frames.base.urdf is None:
+        raise MappingError("the base frame needs 'urdf': placements of URDF sources are expressed in it", where=path)
+    on_chain: dict[str, UrdfJoint] = {}
+    for frame in frames.frames:
+        if frame.urdf is not None:
+            on_chain.update({j.name: j for j in urdf.between(frames.base.urdf, frame.urdf)})
+    for joint in on_chain.values():
+        if joint.type in UNSUPPORTED:
+            raise UrdfError(
+                f"joint {joint.name!r} on the chain is {joint.type}: expected revolute, continuous, prismatic or fixed",
+                where=urdf.path, line=joint.line, hint="no DH row can describe it; map frames on one side of it only",
+            )  # fmt: skip
+        leader = _leader(urdf, joint)
+        if joint.type in MOVABLE and leader.name not in source:
+            moved = sum(j.type in MOVABLE and j.mimic is None for j in on_chain.values())
+            raise MappingError(
+                f"URDF joint {leader.name!r} moves a mapped link, but no model joint drives it: dh.csv has {len(source)} "
+                f"joints, the chain has {moved}; {nearest(leader.name, source.values())}",
+                where=path, key="joints",
+            )  # fmt: skip
+    leaders = {_leader(urdf, j).name for j in on_chain.values()}
+    for joint_name, name in source.items():
+        if joint_name not in leaders:
+            raise MappingError(
+                f"{joint_name!r} moves none of the mapped links: dh.csv and the chain do not have the same joints",
+                where=path, key=f"joints.{name}",
+            )  # fmt: skip
+
+
+def _leader(urdf: Urdf, joint: UrdfJoint) -> UrdfJoint:
+    while joint.mimic is not None:
+        joint = urdf.joints[joint.mimic.joint]
+    return joint
+
+
+def _complete(rows: dict[str, tuple[Array, float]], urdf: Urdf, n: int) -> JointMap:
+    """Add held joints at zero and followers at multiplier * leader + offset."""
+
+    def row(joint: UrdfJoint) -> tuple[Array, float]:
+        if joint.mimic is None:
+            return rows.get(joint.name, (np.zeros(n), 0.0))
+        a, b = row(urdf.joints[joint.mimic.joint])
+        return joint.mimic.multiplier * a, joint.mimic.multiplier * b + joint.mimic.offset
+
+    joints = [urdf.joints[name] for name in urdf.movable]
+    pairs = [row(joint) for joint in joints]
+    return JointMap(
+        names=urdf.movable,
+        A=np.array([a for a, _ in pairs]).reshape(len(joints), n),
+        b=np.array([b for _, b in pairs]),
+        followers=tuple(j.name for j in joints if j.mimic is not None),
+        held=tuple(j.name for j in joints if j.mimic is None and j.name not in rows),
+    )
+
+
+def random_limits(table: DHTable, urdf: Urdf | None, joint_map: JointMap | None) -> dict[str, tuple[float, float]]:
+    """Range of each model joint for random draws, from the URDF limits where one URDF joint is that joint up to sign and zero.
+
+    Revolute joints without limits get [-pi, pi]; prismatic ones are left out, since no range can be assumed.
+    """
+    ranges: dict[str, tuple[float, float]] = {}
+    for i, name in enumerate(table.joints):
+        if table.kind(name) == "revolute":
+            ranges[name] = (-math.pi, math.pi)
+        if urdf is None or joint_map is None:
+            continue
+        for row, joint_name in enumerate(joint_map.names):
+            joint, a = urdf.joints[joint_name], joint_map.A[row]
+            alone = abs(a[i]) == 1.0 and np.count_nonzero(a) == 1 and joint.mimic is None
+            if alone and joint.type != "continuous" and joint.limits and joint.limits[0] < joint.limits[1]:
+                ends = sorted((limit - joint_map.b[row]) / a[i] for limit in joint.limits)
+                ranges[name] = (float(ends[0]), float(ends[1]))
+    return ranges

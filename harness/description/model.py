@@ -1,0 +1,209 @@
+"""One folder of models/ becomes a `RobotModel`: table, mapping, configurations, URDF, tolerances, required sources."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from harness.description.configurations import ConfigurationSet, ConfigurationsFile, resolve_configurations
+from harness.description.dh import Convention, DHTable, SuspectNumber, read_dh_csv
+from harness.description.frames import FrameMap, FramesFile, resolve_frames
+from harness.description.joints import JointMap, identity_map, random_limits, resolve_joints
+from harness.description.locate import locate_urdf
+from harness.description.toml_file import read_toml
+from harness.description.urdf import Urdf, read_urdf
+from harness.description.urdf_lint import Finding, check
+from harness.description.values import Number, Strict, Transform
+from harness.errors import MappingError, ModelFileError, nearest
+
+SourceName = str
+
+
+class Provenance(Strict):
+    """Where the numbers of dh.csv come from."""
+
+    document: str = Field(min_length=1)
+    page: str = ""
+    date: str = ""
+    note: str = ""
+
+
+class Tolerance(Strict):
+    """Largest discrepancy that counts as agreement: `position` [m], `rotation` [rad]."""
+
+    position: Number = Field(gt=0)
+    rotation: Number = Field(gt=0)
+
+
+class SourceEntry(Strict):
+    """One `[[source]]`: a required one must run; any one that runs must agree."""
+
+    name: SourceName = Field(pattern=r"^[a-z]+:\S+$")
+    required: bool = True
+    tolerance: Tolerance | None = None
+
+
+class AcceptedEntry(Strict):
+    """One `[[accepted]]` deviation: for each source and frame the largest discrepancy, right to within `within` (relative).
+
+    `position` [m] or `rotation` [rad] left out means: that part must be below tolerance.
+    """
+
+    source: SourceName | list[SourceName]
+    frame: str | list[str]
+    position: Number = Field(default=0.0, ge=0)
+    rotation: Number = Field(default=0.0, ge=0)
+    within: Number = Field(default=0.02, gt=0, lt=1)
+    reason: str = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _deviates(self) -> AcceptedEntry:
+        if self.position == 0.0 and self.rotation == 0.0:
+            raise ValueError("expected the size of the deviation: position, rotation or both")
+        return self
+
+    @property
+    def sources(self) -> list[str]:
+        return [self.source] if isinstance(self.source, str) else self.source
+
+    @property
+    def frames(self) -> list[str]:
+        return [self.frame] if isinstance(self.frame, str) else self.frame
+
+
+class UrdfEntry(Strict):
+    """`[urdf]`: `file` under urdf/, or `package` (an installed distribution) and `file` inside it."""
+
+    file: str = Field(min_length=1)
+    package: str | None = None
+
+
+class ModelFile(Strict):
+    """model.toml."""
+
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")
+    description: str = Field(min_length=1)
+    convention: Convention
+    provenance: Provenance
+    tolerance: Tolerance
+    base: Transform | None = None
+    tool: Transform | None = None
+    urdf: UrdfEntry | None = None
+    source: list[SourceEntry] = Field(min_length=1)
+    accepted: list[AcceptedEntry] = []
+
+
+@dataclass(frozen=True)
+class RobotModel:
+    """A robot model, read and checked against itself."""
+
+    folder: Path
+    file: ModelFile
+    table: DHTable
+    urdf: Urdf | None
+    frames: FrameMap
+    urdf_joints: JointMap | None
+    configurations: ConfigurationSet
+    findings: tuple[Finding, ...]
+    suspects: tuple[SuspectNumber, ...]
+    hashes: dict[str, str]
+
+    @property
+    def name(self) -> str:
+        return self.file.name
+
+    def joint_map(self, kind: str) -> JointMap:
+        """Map from model joints to those of the description kind, `dh` or `urdf`."""
+        if kind == "urdf" and self.urdf_joints is not None:
+            return self.urdf_joints
+        return identity_map(self.table)
+
+    def unmapped(self) -> tuple[list[str], list[str]]:
+        """DH frames and chain links that no entry maps: nothing is checked there."""
+        mapped_dh = {f.dh for f in self.frames.frames}
+        same_as_base = {"base"} if "0" in mapped_dh and np.array_equal(self.table.base, np.eye(4)) else set()
+        if np.array_equal(self.table.tool, np.eye(4)):
+            same_as_base |= {"tool"}
+        if "base" in mapped_dh and np.array_equal(self.table.base, np.eye(4)):
+            same_as_base |= {"0"}
+        labels = [x for x in self.table.frames if x not in mapped_dh and x not in same_as_base]
+        if self.urdf is None or self.frames.base.urdf is None:
+            return labels, []
+        links = {self.frames.base.urdf: None}
+        for frame in self.frames.frames:
+            if frame.urdf is not None:
+                for joint in self.urdf.between(self.frames.base.urdf, frame.urdf):
+                    links.update({joint.parent: None, joint.child: None})
+        mapped_links = {f.urdf for f in self.frames.frames}
+        return labels, [link for link in links if link not in mapped_links]
+
+
+def load_model(folder: Path) -> RobotModel:
+    """Read and validate one robot model folder.
+
+    Raises ModelFileError, MappingError, UrdfError (wrong input) or DescriptionUnavailable (data package not installed).
+    """
+    if not folder.is_dir():
+        raise ModelFileError("no such robot model folder", where=folder)
+    paths = {name: folder / name for name in ("dh.csv", "model.toml", "frames.toml", "configurations.toml")}
+    file = read_toml(paths["model.toml"], ModelFile)
+    rows, suspects = read_dh_csv(paths["dh.csv"])
+    table = DHTable(
+        rows,
+        file.convention,
+        file.base.matrix() if file.base else np.eye(4),
+        file.tool.matrix() if file.tool else np.eye(4),
+    )
+    if not table.joints:
+        raise ModelFileError("expected at least one joint that moves, every row is fixed", where=paths["dh.csv"])
+    urdf, findings, urdf_path = None, (), None
+    if file.urdf is not None:
+        urdf_path = locate_urdf(file.urdf.file, file.urdf.package, folder)
+        urdf = read_urdf(urdf_path)
+        findings = check(urdf)
+    frames_file = read_toml(paths["frames.toml"], FramesFile)
+    frames = resolve_frames(frames_file, table, urdf, paths["frames.toml"])
+    joints = resolve_joints(frames_file.joints, table, urdf, frames, paths["frames.toml"]) if urdf else None
+    configurations = resolve_configurations(
+        read_toml(paths["configurations.toml"], ConfigurationsFile),
+        table,
+        random_limits(table, urdf, joints),
+        paths["configurations.toml"],
+    )
+    _check_sources(file, frames, paths["model.toml"])
+    hashes = {name: _sha256(path) for name, path in paths.items()}
+    if file.urdf is not None and urdf_path is not None:
+        hashes[f"{file.urdf.package or 'urdf'}:{file.urdf.file}"] = _sha256(urdf_path)
+    return RobotModel(folder, file, table, urdf, frames, joints, configurations, findings, suspects, hashes)
+
+
+def _check_sources(file: ModelFile, frames: FrameMap, path: Path) -> None:
+    names: list[str] = []
+    for i, entry in enumerate(file.source):
+        if entry.name in names:
+            raise ModelFileError(f"source {entry.name!r} is there twice", where=path, key=f"source[{i}].name")
+        if file.urdf is None and not entry.name.startswith("dh:"):
+            raise ModelFileError(f"{entry.name!r} needs a [urdf] table", where=path, key=f"source[{i}].name")
+        names.append(entry.name)
+    seen: set[tuple[str, str]] = set()
+    for i, accepted in enumerate(file.accepted):
+        for kind, values, known in (
+            ("source", accepted.sources, names),
+            ("frame", accepted.frames, [f.name for f in frames.frames]),
+        ):
+            for value in values:
+                if value not in known:
+                    raise MappingError(f"no {kind} {value!r}; {nearest(value, known)}", where=path, key=f"accepted[{i}].{kind}")
+        for pair in ((s, f) for s in accepted.sources for f in accepted.frames):
+            if pair in seen:
+                raise ModelFileError(f"{pair[0]} at {pair[1]} is accepted twice", where=path, key=f"accepted[{i}]")
+            seen.add(pair)
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

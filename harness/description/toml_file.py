@@ -1,0 +1,105 @@
+"""Reads a TOML file into a typed table, and turns every refusal into one line: file, key, expected, found, nearest spelling."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from harness.errors import ModelFileError, nearest
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+Table = TypeVar("Table", bound=BaseModel)
+
+MAX_BYTES = 4_000_000
+
+
+def read_text(path: Path) -> str:
+    """The text of a model file. Raises ModelFileError if it is absent, unreadable, too large or not UTF-8."""
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise ModelFileError(f"expected a file below {MAX_BYTES} bytes, got {path.stat().st_size}", where=path)
+        return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        present = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
+        raise ModelFileError("no such file", where=path, hint=nearest(path.name, present)) from None
+    except UnicodeDecodeError as error:
+        raise ModelFileError(f"expected UTF-8 text: {error.reason} at byte {error.start}", where=path) from None
+    except OSError as error:
+        raise ModelFileError(f"cannot be read: {error.strerror}", where=path) from None
+
+
+def read_toml(path: Path, table: type[Table]) -> Table:
+    """Parse `path` and validate it as `table`. Raises ModelFileError."""
+    try:
+        data = tomllib.loads(read_text(path))
+    except tomllib.TOMLDecodeError as error:
+        raise ModelFileError(f"not TOML: {error}", where=path) from None
+    return validate(data, table, path)
+
+
+def validate(data: Mapping[str, Any], table: type[Table], path: Path) -> Table:
+    """`data` as a `table`. Raises ModelFileError for the first thing wrong, counting the others."""
+    try:
+        return table.model_validate(data)
+    except ValidationError as failure:
+        errors = failure.errors(include_url=False)
+        # Unknown keys first: a misspelt key is the cause of the 'missing' one that comes with it.
+        errors.sort(key=lambda e: e["type"] != "extra_forbidden")
+        first, more = errors[0], len(errors) - 1
+        problem = _problem(dict(first), table)
+        if more:
+            problem += f" (and {more} more in this file)"
+        raise ModelFileError(problem, where=path, key=_dotted(first["loc"])) from None
+
+
+def _problem(error: Mapping[str, Any], table: type[BaseModel]) -> str:
+    loc, kind = error["loc"], error["type"]
+    if kind == "extra_forbidden":
+        return f"unknown key; {nearest(str(loc[-1]), _keys_at(table, loc[:-1]))}"
+    if kind == "missing":
+        return "required key is missing"
+    message = str(error["msg"]).removeprefix("Value error, ")
+    message = message[0].lower() + message[1:]
+    value = error.get("input")
+    if isinstance(value, (str, int, float)) and repr(value) not in message:
+        message += f", got {value!r}"
+    return message
+
+
+def _keys_at(table: type[BaseModel], loc: tuple[Any, ...]) -> list[str]:
+    """The keys allowed where `loc` points, found by walking the types."""
+    node: Any = table
+    for step in loc:
+        if not (isinstance(node, type) and issubclass(node, BaseModel)):
+            return []
+        if isinstance(step, str):
+            by_key = {field.alias or name: field.annotation for name, field in node.model_fields.items()}
+            node = _model_in(by_key.get(step, node))
+    if isinstance(node, type) and issubclass(node, BaseModel):
+        return [field.alias or name for name, field in node.model_fields.items()]
+    return []
+
+
+def _model_in(annotation: Any) -> Any:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for inner in get_args(annotation):
+        found = _model_in(inner)
+        if isinstance(found, type) and issubclass(found, BaseModel):
+            return found
+    return annotation
+
+
+def _dotted(loc: tuple[Any, ...]) -> str:
+    text = ""
+    for step in loc:
+        text += f"[{step}]" if isinstance(step, int) else (f".{step}" if text else str(step))
+    return text

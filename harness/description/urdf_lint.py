@@ -1,0 +1,157 @@
+"""What is suspicious or broken in a URDF, found before any engine reads it.
+
+Engines disagree about defaults and share mistakes, so a majority of them proves nothing: the file is judged first.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from harness.description.urdf import UNSUPPORTED, Urdf, UrdfJoint
+from harness.description.values import find_truncation
+from harness.errors import UrdfError, nearest
+
+MAX_DEPTH = 1_000
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One lint result. `error`: not a kinematic tree, refused; `warning`: engines are known to differ on it; `note`."""
+
+    code: str
+    level: Literal["error", "warning", "note"]
+    subject: str
+    message: str
+    line: int
+
+
+def lint(urdf: Urdf) -> tuple[Finding, ...]:
+    """All findings, errors first, then by line."""
+    found = [*_names(urdf), *_structure(urdf)]
+    for joint in urdf.joint_list:
+        found += [*_axis(joint), *_mimic(urdf, joint), *_numbers(joint)]
+    order = {"error": 0, "warning": 1, "note": 2}
+    return tuple(sorted(found, key=lambda f: (order[f.level], f.line)))
+
+
+def check(urdf: Urdf) -> tuple[Finding, ...]:
+    """The findings of a URDF that is one kinematic tree. Raises UrdfError for the first `error` finding."""
+    findings = lint(urdf)
+    errors = [f for f in findings if f.level == "error"]
+    if errors:
+        more = f" (and {len(errors) - 1} more errors)" if len(errors) > 1 else ""
+        raise UrdfError(f"{errors[0].message}{more}", where=urdf.path, line=errors[0].line, key=errors[0].code)
+    return findings
+
+
+def _names(urdf: Urdf) -> Iterator[Finding]:
+    for code, items in (("duplicate-link", urdf.link_list), ("duplicate-joint", urdf.joint_list)):
+        counts = Counter(item.name for item in items)
+        for item in items:
+            if counts[item.name] > 1:
+                lines = [str(other.line) for other in items if other.name == item.name]
+                counts[item.name] = 0
+                what = code.removeprefix("duplicate-")
+                yield Finding(
+                    code, "error", item.name, f"{what} name {item.name!r} is used on lines {', '.join(lines)}", item.line
+                )
+
+
+def _structure(urdf: Urdf) -> Iterator[Finding]:
+    links = set(urdf.links)
+    above: dict[str, UrdfJoint] = {}
+    for joint in urdf.joint_list:
+        for role, link in (("parent", joint.parent), ("child", joint.child)):
+            if link not in links:
+                message = f"joint {joint.name!r} names {role} link {link!r}, which does not exist; {nearest(link, links)}"
+                yield Finding("unknown-link", "error", joint.name, message, joint.line)
+        if joint.child in above:
+            message = f"link {joint.child!r} has two parents: joints {above[joint.child].name!r} and {joint.name!r}"
+            yield Finding("two-parents", "error", joint.child, message, joint.line)
+        above.setdefault(joint.child, joint)
+    depth = _depths(urdf, above)
+    in_cycle = [link for link in urdf.link_list if link.name not in depth]
+    if in_cycle:
+        names = ", ".join(link.name for link in in_cycle[:5])
+        message = f"{len(in_cycle)} links cannot be reached from any root, they hang on a cycle: {names}"
+        yield Finding("cycle", "error", in_cycle[0].name, message, in_cycle[0].line)
+    if depth and max(depth.values()) > MAX_DEPTH:
+        deepest = max(depth, key=lambda name: depth[name])
+        message = f"expected a tree at most {MAX_DEPTH} joints deep, got {depth[deepest]}"
+        yield Finding("too-deep", "error", deepest, message, 0)
+    for root in urdf.roots[1:]:
+        line = next(link.line for link in urdf.link_list if link.name == root)
+        message = f"link {root!r} cannot be reached from the root {urdf.roots[0]!r}: no joint has it as its child"
+        yield Finding("unreachable-link", "error", root, message, line)
+
+
+def _depths(urdf: Urdf, above: dict[str, UrdfJoint]) -> dict[str, int]:
+    """Distance from its root of every link that has one; links on or below a cycle are left out."""
+    depth: dict[str, int] = dict.fromkeys(urdf.roots, 0)
+    queue = list(urdf.roots)
+    while queue:
+        link = queue.pop()
+        for joint in urdf.children(link):
+            if joint.child not in depth and above.get(joint.child) is joint:
+                depth[joint.child] = depth[link] + 1
+                queue.append(joint.child)
+    return depth
+
+
+def _axis(joint: UrdfJoint) -> Iterator[Finding]:
+    if joint.type == "fixed":
+        return
+    if joint.type in UNSUPPORTED:
+        message = f"joint {joint.name!r} is {joint.type}: engines read it differently, and no DH row matches it"
+        yield Finding("unsupported-joint", "warning", joint.name, message, joint.line)
+        return
+    if joint.axis is None:
+        message = f"joint {joint.name!r} has no <axis>: x by the specification, z in some engines"
+        yield Finding("missing-axis", "warning", joint.name, message, joint.line)
+        return
+    length = math.sqrt(sum(x * x for x in joint.axis))
+    text = " ".join(f"{x:g}" for x in joint.axis)
+    if length == 0.0:
+        yield Finding("zero-axis", "error", joint.name, f"joint {joint.name!r} has axis {text}", joint.line)
+        return
+    # Files write 0.7071 0.7071 0 and mean a unit vector; engines differ as soon as it is off by more than rounding.
+    if abs(length - 1.0) > 1e-12:
+        message = f"joint {joint.name!r} has axis {text} of length {length:.9g}: some engines scale the travel by it"
+        yield Finding("unnormalised-axis", "warning", joint.name, message, joint.line)
+    if sum(x != 0.0 for x in joint.axis) > 1:
+        message = f"joint {joint.name!r} has the oblique axis {text}: some engines turn it the wrong way"
+        yield Finding("oblique-axis", "note", joint.name, message, joint.line)
+
+
+def _mimic(urdf: Urdf, joint: UrdfJoint) -> Iterator[Finding]:
+    if joint.mimic is None:
+        return
+    leader = urdf.joints.get(joint.mimic.joint)
+    if leader is None:
+        hint = nearest(joint.mimic.joint, urdf.joints)
+        message = f"joint {joint.name!r} mimics {joint.mimic.joint!r}, which does not exist; {hint}"
+        yield Finding("unknown-mimic", "error", joint.name, message, joint.line)
+        return
+    seen = [joint.name]
+    while leader is not None and leader.mimic is not None and leader.name not in seen:
+        seen.append(leader.name)
+        leader = urdf.joints.get(leader.mimic.joint)
+    if leader is not None and leader.name in seen:
+        yield Finding("mimic-cycle", "error", joint.name, f"joint {joint.name!r} mimics itself", joint.line)
+        return
+    message = f"joint {joint.name!r} mimics {joint.mimic.joint!r}: nine of eleven engines ignore that"
+    yield Finding("mimic", "warning", joint.name, message, joint.line)
+
+
+def _numbers(joint: UrdfJoint) -> Iterator[Finding]:
+    for where, text in joint.texts:
+        if where not in ("origin rpy", "mimic offset"):
+            continue
+        for word in dict.fromkeys(text.split()):
+            if truncation := find_truncation(word):
+                message = f"joint {joint.name!r} {where}: {word} is {truncation.exact} cut short, off by {truncation.error:.1e} rad"
+                yield Finding("truncated-pi", "note", joint.name, message, joint.line)

@@ -1,0 +1,1 @@
+"""Who computes forward kinematics: one file an engine, all behind `base.Engine`."""

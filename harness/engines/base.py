@@ -1,0 +1,114 @@
+"""What every engine is to the harness: joints, frames and a batch of placements, all by name.
+
+An adapter uses its library as users do and repairs nothing. What a library does differently is recorded as a `Trait`.
+"""
+
+from __future__ import annotations
+
+import importlib
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import metadata
+from types import ModuleType
+from typing import Any, ClassVar
+
+import numpy as np
+from packaging.requirements import Requirement
+
+from harness.errors import EngineFailed, EngineUnavailable, nearest
+from harness.se3 import Array
+
+
+@dataclass(frozen=True)
+class Trait:
+    """Something an engine does differently from the URDF specification or from other engines.
+
+    `key` names it; `lint` is the URDF finding that makes it matter (None: always); `evidence` is how it is known.
+    """
+
+    key: str
+    text: str
+    evidence: str
+    lint: str | None = None
+
+
+class Engine(ABC):
+    """Forward kinematics of one description by one library.
+
+    Subclasses take the description in their constructor: a `DHTable` if `source` starts with `dh:`, a `Urdf` if with
+    `urdf:`. They set `joints` and `frames` in the library's own order and implement `_placements`. Importing a
+    subclass's module must not import the library: use `library()` in the constructor.
+    """
+
+    source: ClassVar[str]
+    requirements: ClassVar[tuple[str, ...]] = ()
+    traits: ClassVar[tuple[Trait, ...]] = ()
+    applies_mimic: ClassVar[bool] = False
+
+    joints: tuple[str, ...]
+    frames: tuple[str, ...]
+
+    def __init__(self, description: Any) -> None:
+        """Build the library's model. Raises EngineUnavailable if it is not installed, EngineFailed if it refuses."""
+
+    @abstractmethod
+    def _placements(self, q: Array, frames: Sequence[str]) -> Array:
+        """Placements for checked arguments; see `placements`."""
+
+    def placements(self, q: Array, frames: Sequence[str]) -> Array:
+        """Placement of each named frame in the library's own root frame.
+
+        q: (N, n) float64, columns as `joints` [rad or m]. Returns (N, len(frames), 4, 4) [m].
+        Raises ValueError for a `q` of the wrong shape, KeyError for a frame the engine does not have, EngineFailed for a
+        result of the wrong shape.
+        """
+        q = np.asarray(q, dtype=np.float64)
+        if q.ndim != 2 or q.shape[1] != len(self.joints):
+            raise ValueError(f"{self.source}: expected q of shape (N, {len(self.joints)}), got {q.shape}")
+        for frame in frames:
+            if frame not in self.frames:
+                raise KeyError(f"{self.source} has no frame {frame!r}; {nearest(frame, self.frames)}")
+        T = np.asarray(self._placements(q, frames))
+        expected = (q.shape[0], len(frames), 4, 4)
+        if T.shape != expected or T.dtype != np.float64:
+            raise EngineFailed(self.source, f"expected placements float64 {expected}, got {T.dtype} {T.shape}")
+        return T
+
+    @classmethod
+    def versions(cls) -> dict[str, str]:
+        """Installed version of each required distribution; those that are missing are left out."""
+        found = {}
+        for requirement in cls.requirements:
+            name = Requirement(requirement).name
+            try:
+                found[name] = metadata.version(name)
+            except metadata.PackageNotFoundError:
+                continue
+        return found
+
+    @classmethod
+    def install_line(cls) -> str:
+        """The command that installs what this engine needs."""
+        return "pip install " + " ".join(f'"{r}"' if set(r) & set("<>=!~ ;[") else r for r in cls.requirements)
+
+    @classmethod
+    def check_requirements(cls) -> None:
+        """Raise EngineUnavailable if a distribution is missing or too old."""
+        found = cls.versions()
+        for text in cls.requirements:
+            need = Requirement(text)
+            have = found.get(need.name)
+            if have is None:
+                raise EngineUnavailable(cls.source, f"{need.name} is not installed", cls.install_line())
+            if not need.specifier.contains(have, prereleases=True):
+                raise EngineUnavailable(cls.source, f"needs {text}, found {need.name} {have}", cls.install_line())
+
+    @classmethod
+    def library(cls, module: str) -> ModuleType:
+        """Import the library. Raises EngineUnavailable with the install line."""
+        cls.check_requirements()
+        try:
+            return importlib.import_module(module)
+        except ImportError as error:
+            raise EngineUnavailable(cls.source, f"import {module} failed: {error}", cls.install_line()) from error

@@ -1,0 +1,72 @@
+"""Which engines there are: every entry point in the group `fk_crosscheck.engines`, ours and third parties' alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import metadata
+
+from harness.description.model import RobotModel
+from harness.engines.base import Engine
+from harness.errors import DescriptionUnavailable, EngineUnavailable, InputError, nearest
+
+GROUP = "fk_crosscheck.engines"
+REFERENCE = "dh:numpy"
+
+
+@dataclass(frozen=True)
+class Registered:
+    """One entry point: its adapter class, or why it could not be imported."""
+
+    name: str
+    adapter: type[Engine] | None
+    problem: str = ""
+
+
+@lru_cache(maxsize=1)
+def registered() -> dict[str, Registered]:
+    """All engines by source name, the in-house one first, then by name.
+
+    The entry point's name is the source name with `-` for `:`. A broken third-party adapter is listed with its problem.
+    """
+    found: dict[str, Registered] = {}
+    for point in metadata.entry_points(group=GROUP):
+        source = point.name.replace("-", ":", 1)
+        try:
+            adapter = point.load()
+            if not (isinstance(adapter, type) and issubclass(adapter, Engine)):
+                raise TypeError(f"{point.value} is not a subclass of harness.engines.base.Engine")
+            entry = Registered(adapter.source, adapter)
+        except Exception as error:  # third-party code: whatever it raises must not end the run
+            entry = Registered(source, None, f"entry point {point.value}: {type(error).__name__}: {error}")
+        if entry.name in found and found[entry.name].adapter is not entry.adapter:
+            entry = Registered(entry.name, None, f"two packages offer {entry.name}: second is {point.value}")
+        found[entry.name] = entry
+    return dict(sorted(found.items(), key=lambda item: (item[0] != REFERENCE, item[0])))
+
+
+def adapter_of(source: str) -> type[Engine]:
+    """Adapter class of a source name. Raises InputError if unknown, EngineUnavailable if its adapter is broken."""
+    known = registered()
+    if source not in known:
+        raise InputError(f"no source {source!r}; {nearest(source, known)}")
+    entry = known[source]
+    if entry.adapter is None:
+        raise EngineUnavailable(source, entry.problem)
+    return entry.adapter
+
+
+def load_engine(source: str, model: RobotModel) -> Engine:
+    """Build the engine `source` on the model's description.
+
+    Raises InputError (unknown source), EngineUnavailable (not installed), EngineFailed (refuses the description).
+    """
+    adapter = adapter_of(source)
+    kind = source.partition(":")[0]
+    if kind == "dh":
+        return adapter(model.table)
+    if kind == "urdf":
+        if model.urdf is None:
+            raise DescriptionUnavailable(f"{source}: {model.name} has no URDF")
+        return adapter(model.urdf)
+    raise InputError(f"{source!r}: no description of kind {kind!r}; known: dh, urdf")

@@ -1,0 +1,64 @@
+"""`urdf:yourdfpy`: its scene graph, one configuration at a time (https://github.com/clemense/yourdfpy)."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+
+import numpy as np
+
+from harness.description.urdf import Urdf
+from harness.engines.base import Engine, Trait
+from harness.errors import EngineFailed
+from harness.se3 import Array
+
+
+class UrdfYourdfpy(Engine):
+    """`URDF.load`, `update_cfg`, `get_transform`, as its README shows, without meshes."""
+
+    source = "urdf:yourdfpy"
+    requirements = ("yourdfpy>=0.0.56",)
+    applies_mimic = True
+    traits = (
+        Trait(
+            "prismatic-scaled",
+            "the travel of a prismatic joint is multiplied by the length of its axis",
+            "yourdfpy 0.0.60 on a one-joint URDF: axis 0 0 2 moves twice as far",
+            lint="unnormalised-axis",
+        ),
+        Trait(
+            "mimic-applied",
+            "mimic joints follow their leader, as the specification says",
+            "yourdfpy 0.0.60 on a two-joint URDF",
+            lint="mimic",
+        ),
+        Trait(
+            "no-floating-planar",
+            "loads floating and planar joints, then update_cfg raises",
+            "yourdfpy 0.0.60 on a one-joint URDF",
+            lint="unsupported-joint",
+        ),
+    )
+
+    def __init__(self, description: Urdf) -> None:
+        yourdfpy = self.library("yourdfpy")
+        try:
+            self._robot = yourdfpy.URDF.load(
+                io.BytesIO(description.text.encode()),
+                build_scene_graph=True,
+                load_meshes=False,
+                build_collision_scene_graph=False,
+                load_collision_meshes=False,
+            )
+        except Exception as error:  # the parser raises whatever its own code happens to hit
+            raise EngineFailed(self.source, f"URDF.load refused the URDF: {type(error).__name__}: {error}") from error
+        self.joints = tuple(self._robot.actuated_joint_names)
+        self.frames = tuple(self._robot.link_map)
+
+    def _placements(self, q: Array, frames: Sequence[str]) -> Array:
+        out = np.empty((q.shape[0], len(frames), 4, 4))
+        for k, q_k in enumerate(q):
+            self._robot.update_cfg(q_k)
+            for slot, frame in enumerate(frames):
+                out[k, slot] = self._robot.get_transform(frame)
+        return out

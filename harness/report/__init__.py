@@ -1,0 +1,1 @@
+"""Telling it: JSON, HTML, Markdown, JUnit. Knows only the report document."""

@@ -1,0 +1,284 @@
+"""The report document: typed once; JSON Schema is generated from these types and every format is rendered from them.
+
+Units are metres and radians. Everything that varies between two equal runs (times, versions, host) is in `environment`.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from harness.errors import InputError
+
+FORMAT = "fk-crosscheck report"
+VERSION = "1.0"
+
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Configuration = list[Finite]
+Matrix = list[list[Finite]]
+
+
+class Part(BaseModel):
+    """Base of all parts: immutable, no unknown keys."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class At(Part):
+    """A configuration: its index (fixed first, then random), its name and q [rad or m]."""
+
+    index: int
+    label: str
+    q: Configuration
+
+
+class Statistics(Part):
+    """Of one discrepancy, over all configurations. Quantiles are upper bounds, at most 15.5 % high; `decades` counts
+    values by power of ten."""
+
+    count: int
+    max: NonNegative
+    mean: NonNegative
+    p50: NonNegative
+    p95: NonNegative
+    p99: NonNegative
+    decades: dict[str, int]
+    worst: At | None
+
+
+class Tolerance(Part):
+    """Largest discrepancy that counts as agreement."""
+
+    position: NonNegative
+    rotation: NonNegative
+
+
+class Accepted(Part):
+    """A deviation on file for this source and frame."""
+
+    position: NonNegative
+    rotation: NonNegative
+    within: NonNegative
+    reason: str
+
+
+class FrameResult(Part):
+    """One source at one mapped frame, against the reference."""
+
+    frame: str
+    verdict: Literal["agrees", "disagrees", "accepted", "deviation changed", "deviation vanished", "not compared"]
+    position: Statistics
+    rotation: Statistics
+    noise: str
+    accepted: Accepted | None = None
+
+
+class Reproducer(Part):
+    """The worst configuration of a source, shrunk: joints set to zero while the frame still disagrees."""
+
+    frame: str
+    q: Configuration
+    position: NonNegative
+    rotation: NonNegative
+    reference_placement: Matrix
+    source_placement: Matrix
+
+
+class TraitNote(Part):
+    """A trait of an engine. `lint` is the URDF finding that makes it matter; `applies` says whether this URDF has it."""
+
+    key: str
+    text: str
+    evidence: str
+    lint: str
+    applies: bool
+
+
+class Validity(Part):
+    """Placements checked for being placements: finite, last row 0 0 0 1, rotation in SO(3)."""
+
+    checked: int
+    invalid: int
+    residual: NonNegative
+    first: At | None = None
+    first_frame: str = ""
+
+
+class Source(Part):
+    """One source: whether it ran, what it was given, and how it compares."""
+
+    name: str
+    required: bool
+    reference: bool = False
+    status: Literal["ran", "not run", "failed"]
+    verdict: Literal["reference", "agrees", "agrees as accepted", "disagrees", "invalid placements", "not run", "failed"]
+    reason: str = ""
+    install: str = ""
+    tolerance: Tolerance
+    joints: list[str] = []
+    mimic: str = ""
+    held: list[str] = []
+    traits: list[TraitNote] = []
+    validity: Validity | None = None
+    frames: list[FrameResult] = []
+    worst_frame: str = ""
+    first_disagreeing_frame: str = ""
+    noise: str = ""
+    noise_text: str = ""
+    explained_by: list[str] = []
+    reproducer: Reproducer | None = None
+
+
+class Frame(Part):
+    """One mapped frame. `offset` is T_dh_frame: declared, or measured at the first configuration if rigid."""
+
+    name: str
+    dh: str
+    urdf: str | None
+    relation: Literal["identical", "declared", "rigid"]
+    of: str | None = None
+    offset: Matrix | None = None
+    measured_from: str = ""
+
+
+class PairResult(Part):
+    """Largest discrepancies of two sources over the subset of configurations."""
+
+    a: str
+    b: str
+    position: NonNegative
+    position_frame: str
+    rotation: NonNegative
+    rotation_frame: str
+
+
+class PublishedResult(Part):
+    """A published placement, as claimed and as computed by the in-house FK. Errors are largest entry differences."""
+
+    configuration: str
+    frame: str
+    relative_to: str
+    provenance: str
+    status: Literal["holds", "wrong"]
+    found: Literal["holds", "wrong"]
+    reason: str
+    claimed_position: list[Finite]
+    claimed_rotation: Matrix | None
+    computed: Matrix
+    computed_rpy: list[Finite]
+    tolerance: NonNegative
+    rotation_tolerance: NonNegative
+    position_error: NonNegative
+    rotation_error: NonNegative | None
+
+
+class Lint(Part):
+    """A finding about the URDF, the table or the mapping."""
+
+    code: str
+    level: Literal["error", "warning", "note"]
+    subject: str
+    message: str
+
+
+class Robot(Part):
+    """The robot model the report is about."""
+
+    name: str
+    description: str
+    convention: Literal["standard", "modified"]
+    provenance: dict[str, str]
+    joints: list[str]
+    lower: list[Finite]
+    upper: list[Finite]
+    reach: NonNegative
+    hashes: dict[str, str]
+
+
+class Settings(Part):
+    """What was asked for. `fixed` and `samples` count configurations, `subset` those on which all pairs are compared."""
+
+    reference: str
+    sources: list[str]
+    selection: Literal["model", "command line"]
+    fixed: int
+    samples: int
+    seed: int
+    subset: int
+    command: str
+
+
+class Verdict(Part):
+    """The gate: 0 agreement, 1 disagreement, 3 a required source is missing or failed. `reasons` says why, one a line."""
+
+    exit_code: Literal[0, 1, 3]
+    sentence: str
+    reasons: list[str] = []
+
+
+class Environment(Part):
+    """What varies: times [s], versions, machine. Nothing outside this block does."""
+
+    created: str
+    duration: NonNegative
+    engine_seconds: dict[str, NonNegative]
+    versions: dict[str, dict[str, str]]
+    harness: str
+    python: str
+    platform: str
+
+
+class Report(Part):
+    """The whole document."""
+
+    format: Literal["fk-crosscheck report"] = FORMAT
+    version: Literal["1.0"] = VERSION
+    robot: Robot
+    settings: Settings
+    verdict: Verdict
+    sources: list[Source]
+    frames: list[Frame]
+    unmapped: list[str] = []
+    pairs: list[PairResult]
+    published: list[PublishedResult]
+    lint: list[Lint]
+    environment: Environment
+
+
+def schema() -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of the document, generated from the types."""
+    generated = Report.model_json_schema(mode="serialization")
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **generated}
+
+
+def to_json(report: Report) -> str:
+    """The document as JSON text."""
+    return report.model_dump_json(indent=2) + "\n"
+
+
+def read_report(path: Path) -> Report:
+    """Read a report document. Raises InputError if it cannot be read or is not one of this version."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot be read: {getattr(error, 'strerror', None) or error}", where=path) from None
+    try:
+        data = json.loads(text)
+    except ValueError as error:
+        raise InputError(f"not JSON: {error}", where=path) from None
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise InputError(f"expected a document with \"format\": \"{FORMAT}\"", where=path)
+    if data.get("version") != VERSION:
+        raise InputError(
+            f"expected report version {VERSION}, got {data.get('version')!r}", where=path, hint="run the cross-check again"
+        )
+    try:
+        return Report.model_validate(data)
+    except ValidationError as failure:
+        first = failure.errors(include_url=False)[0]
+        key = ".".join(str(step) for step in first["loc"])
+        raise InputError(f"not a report: {first['msg']}", where=path, key=key) from None

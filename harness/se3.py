@@ -1,0 +1,85 @@
+"""Rigid transforms as 4x4 matrices: constructors, inverse and the two discrepancies.
+
+`T_a_b` maps coordinates in frame b to frame a. All functions broadcast over leading axes, (..., 4, 4), in metres and radians.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+
+QUARTER_TURN = math.pi / 2
+
+
+def sincos(angle: float) -> tuple[float, float]:
+    """Sine and cosine of one angle [rad], exact at multiples of pi/2.
+
+    The double nearest to pi/2 stands for a right angle in a table; its floating-point cosine, 6e-17, is an artefact.
+    """
+    quarters = round(angle / QUARTER_TURN)
+    if angle == quarters * QUARTER_TURN and abs(quarters) <= 4:
+        return (0.0, 1.0, 0.0, -1.0)[quarters % 4], (1.0, 0.0, -1.0, 0.0)[quarters % 4]
+    return math.sin(angle), math.cos(angle)
+
+
+def translation(xyz: Sequence[float]) -> Array:
+    """Pure translation by `xyz` [m], shape (4, 4)."""
+    T = np.eye(4)
+    T[:3, 3] = xyz
+    return T
+
+
+def rotation(axis: str, angle: float) -> Array:
+    """Rotation by `angle` [rad] about the x, y or z axis, shape (4, 4)."""
+    s, c = sincos(angle)
+    i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
+    T = np.eye(4)
+    T[i, i] = T[j, j] = c
+    T[i, j], T[j, i] = -s, s
+    return T
+
+
+def from_xyz_rpy(xyz: Sequence[float], rpy: Sequence[float]) -> Array:
+    """Transform of a URDF `<origin>`: translation [m], then R = Rz(yaw) Ry(pitch) Rx(roll) [rad]. Shape (4, 4)."""
+    roll, pitch, yaw = rpy
+    return translation(xyz) @ rotation("z", yaw) @ rotation("y", pitch) @ rotation("x", roll)
+
+
+def to_rpy(T: Array) -> tuple[float, float, float]:
+    """Roll, pitch, yaw [rad] of one transform; at pitch = +-pi/2 roll is set to zero (only their sum is defined)."""
+    R = T[:3, :3]
+    pitch = math.atan2(-R[2, 0], math.hypot(R[0, 0], R[1, 0]))
+    if math.hypot(R[0, 0], R[1, 0]) < 1e-12:
+        return 0.0, pitch, math.atan2(-R[0, 1], R[1, 1])
+    return math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0])
+
+
+def inverse(T: Array) -> Array:
+    """`T_b_a` from `T_a_b`, shape (..., 4, 4), using that the rotation is orthogonal."""
+    out = np.zeros_like(T)
+    R_t = np.swapaxes(T[..., :3, :3], -1, -2)
+    out[..., :3, :3] = R_t
+    out[..., :3, 3] = -np.einsum("...ij,...j->...i", R_t, T[..., :3, 3])
+    out[..., 3, 3] = 1.0
+    return out
+
+
+def position_error(T_a: Array, T_b: Array) -> Array:
+    """Distance between the origins [m], shape (...)."""
+    return np.asarray(np.linalg.norm(T_a[..., :3, 3] - T_b[..., :3, 3], axis=-1))
+
+
+def rotation_error(T_a: Array, T_b: Array) -> Array:
+    """Angle of the relative rotation [rad] in [0, pi], shape (...).
+
+    From the chord, 2 arcsin(|R_a - R_b|_F / (2 sqrt 2)): resolves to 1e-16, where arccos of the trace stops at 1.5e-8
+    (Huynh 2009, "Metrics for 3D rotations", doi:10.1007/s10851-009-0161-2).
+    """
+    chord = np.linalg.norm(T_a[..., :3, :3] - T_b[..., :3, :3], axis=(-2, -1))
+    return np.asarray(2.0 * np.arcsin(np.minimum(1.0, chord / (2.0 * math.sqrt(2.0)))))
