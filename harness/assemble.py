@@ -13,6 +13,7 @@ from harness.description.published import Published
 from harness.engines.registry import adapter_of
 from harness.errors import CrosscheckError
 from harness.report import document as doc
+from harness.report.text import metres, radians
 from harness.results import Results
 
 
@@ -38,9 +39,7 @@ def assemble(results: Results) -> doc.Report:
     )
 
 
-def verdict(
-    robot: str, sources: list[doc.Source], published: list[doc.PublishedResult], total: int
-) -> doc.Verdict:
+def verdict(robot: str, sources: list[doc.Source], published: list[doc.PublishedResult], total: int) -> doc.Verdict:
     """The gate. A disagreement found (1) stays found even if a required source is missing (3)."""
     wrong, missing = [], []
     for source in sources:
@@ -87,12 +86,14 @@ def describe(source: doc.Source) -> str:
         worst = failing[0]
     if worst.verdict == "not compared":
         return f"frame {worst.frame} was not compared: the engine does not have it or returned nothing finite"
-    by = f"{worst.frame} off by {worst.position.max:.3g} m, {worst.rotation.max:.3g} rad"
+    by = f"{worst.frame} off by {metres(worst.position.max)}, {radians(worst.rotation.max)}"
     if worst.verdict.startswith("deviation") and worst.accepted:
         by += f"; the {worst.verdict} from the accepted {worst.accepted.position:g} m, {worst.accepted.rotation:g} rad"
-    where = worst.position.worst if worst.position.max / source.tolerance.position >= (
-        worst.rotation.max / source.tolerance.rotation
-    ) else worst.rotation.worst  # fmt: skip
+    where = (
+        worst.position.worst
+        if worst.position.max / source.tolerance.position >= (worst.rotation.max / source.tolerance.rotation)
+        else worst.rotation.worst
+    )
     first = f"; first frame that disagrees: {source.first_disagreeing_frame}" if failing[0].frame != worst.frame else ""
     return f"{by} at {where.label if where else '?'}{first}"
 
@@ -105,6 +106,7 @@ def _robot(results: Results) -> doc.Robot:
         description=model.file.description,
         convention=model.table.convention,
         provenance=provenance,
+        base=model.frames.base.name,
         joints=list(model.table.joints),
         lower=model.configurations.lower.tolist(),
         upper=model.configurations.upper.tolist(),

@@ -44,30 +44,28 @@ def assemble_source(results: Results, participant: Participant) -> doc.Source:
     return _judged(results, results.comparison, participant, bound, part)
 
 
-def _judged(
-    results: Results, comparison: Comparison, participant: Participant, bound: Bound, part: doc.Source
-) -> doc.Source:
+def _judged(results: Results, comparison: Comparison, participant: Participant, bound: Bound, part: doc.Source) -> doc.Source:
     """Add the frames, and the verdict that follows from them."""
     reference = results.participants[0]
     tolerance = pair_tolerance(participant.planned, reference.planned)
     frames = [
         _frame(results, comparison, participant.name, reference.name, index, tolerance)
         for index, frame in enumerate(results.model.frames.frames)
-        if frame.name in bound.missing or comparison.position[participant.name].count[index]
-        or bound.view.slots[index] >= 0
-    ]  # fmt: skip
+        if frame.name in bound.missing or comparison.position[participant.name].count[index] or bound.view.slots[index] >= 0
+    ]
     failing = [f for f in frames if f.verdict in FAILING]
     invalid = part.validity is not None and part.validity.invalid > 0
     worst = max(frames, key=lambda f: max(f.position.max / tolerance[0], f.rotation.max / tolerance[1]))
-    noise = classify(
-        max(f.position.max for f in frames), max(f.rotation.max for f in frames), comparison.reach
-    )
+    noise = classify(max(f.position.max for f in frames), max(f.rotation.max for f in frames), comparison.reach)
     verdict = (
-        "invalid placements" if invalid
-        else "disagrees" if failing
-        else "agrees as accepted" if any(f.verdict == "accepted" for f in frames)
+        "invalid placements"
+        if invalid
+        else "disagrees"
+        if failing
+        else "agrees as accepted"
+        if any(f.verdict == "accepted" for f in frames)
         else "agrees"
-    )  # fmt: skip
+    )
     return part.model_copy(
         update={
             "verdict": verdict,
@@ -99,9 +97,7 @@ def _frame(
         rotation=rotation,
         noise=classify(position.max, rotation.max, comparison.reach).key,
         accepted=on_file
-        and doc.Accepted(
-            position=on_file[0].position, rotation=on_file[0].rotation, within=on_file[0].within, reason=on_file[1]
-        ),
+        and doc.Accepted(position=on_file[0].position, rotation=on_file[0].rotation, within=on_file[0].within, reason=on_file[1]),
     )
 
 
@@ -144,9 +140,7 @@ def _traits(results: Results, source: str) -> list[doc.TraitNote]:
         return []
     found = {finding.code for finding in results.model.findings}
     return [
-        doc.TraitNote(
-            key=t.key, text=t.text, evidence=t.evidence, lint=t.lint or "", applies=t.lint is None or t.lint in found
-        )
+        doc.TraitNote(key=t.key, text=t.text, evidence=t.evidence, lint=t.lint or "", applies=t.lint is None or t.lint in found)
         for t in traits
     ]
 

@@ -20,6 +20,7 @@ from harness.sources import Bound, Participant, bind, measure_rigid, pair_tolera
 
 BLOCK = 4096
 SUBSET = 256
+RIGID = 1024
 
 Progress = Callable[[int, int], None]
 
@@ -44,7 +45,7 @@ def crosscheck(model: RobotModel, options: Options, progress: Progress | None = 
 def _bind_all(results: Results) -> None:
     """Load every engine, measure the rigid offsets with the first URDF source that answers, then bind for good."""
     model = results.model
-    zero = model.configurations.fixed_q[0]
+    q = model.configurations.random(results.options.seed, 0, RIGID)
     in_house = bind(DHNumpy(model.table), model, {})
     needs_measuring = any(frame.relation == "rigid" for frame in model.frames.frames)
     engines = {}
@@ -53,7 +54,7 @@ def _bind_all(results: Results) -> None:
             engine = engines[participant.name] = load_engine(participant.name, model)
             participant.bound = bind(engine, model, {})
             if needs_measuring and not results.offsets and participant.name.startswith("urdf:"):
-                results.offsets = measure_rigid(model, in_house, participant.bound, zero)
+                results.offsets = measure_rigid(model, in_house, participant.bound, q)
                 results.measured_from = participant.name
         except Exception as error:  # an engine's failure is its result
             participant.fail(error)
@@ -123,8 +124,11 @@ def _reproduce(results: Results, comparison: Comparison) -> dict[str, Reproduced
 
 
 def _shrunk(reference: Bound, source: Bound, frame: int, q: Array, tolerance: tuple[float, float]) -> Reproduced:
+    def placements(q: Array) -> tuple[Array, Array]:
+        return reference.mapped(q[None, :])[frame][0], source.mapped(q[None, :])[frame][0]
+
     def errors(q: Array) -> tuple[float, float]:
-        T_a, T_b = reference.at(q)[frame], source.at(q)[frame]
+        T_a, T_b = placements(q)
         return float(position_error(T_a, T_b)), float(rotation_error(T_a, T_b))
 
     def disagrees(q: Array) -> bool:
@@ -132,7 +136,7 @@ def _shrunk(reference: Bound, source: Bound, frame: int, q: Array, tolerance: tu
 
     q = shrink(q, disagrees)
     position, rotation = errors(q)
-    return Reproduced(frame, q, position, rotation, reference.at(q)[frame], source.at(q)[frame])
+    return Reproduced(frame, q, position, rotation, *placements(q))
 
 
 def regenerate(model: RobotModel, index: int, seed: int) -> Array:

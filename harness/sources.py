@@ -19,7 +19,6 @@ from harness.engines.registry import REFERENCE, adapter_of
 from harness.errors import EngineFailed, EngineUnavailable, InputError, nearest
 from harness.se3 import Array
 
-
 Status: TypeAlias = Literal["ran", "not run", "failed"]
 
 
@@ -51,8 +50,7 @@ class Participant:
         """Take the source out and keep why. What third-party code raises is its result, not the end of the run."""
         self.bound = None
         self.status = "not run" if isinstance(error, EngineUnavailable) else "failed"
-        known = isinstance(error, (EngineUnavailable, EngineFailed))
-        self.reason = error.reason if known else f"{type(error).__name__}: {error}"
+        self.reason = error.reason if isinstance(error, EngineUnavailable | EngineFailed) else f"{type(error).__name__}: {error}"
         self.install = (error.install or "") if isinstance(error, EngineUnavailable) else ""
 
 
@@ -73,7 +71,8 @@ def plan(model: RobotModel, chosen: Sequence[str], reference: str) -> list[Plann
         planned.append(Planned(name, required, (entry and entry.tolerance) or model.file.tolerance))
     if len(planned) < 2:
         raise InputError(
-            f"{model.name}: nothing to compare with the reference {reference}", hint=f"choose among: {', '.join(entries)}"
+            f"{model.name}: nothing to compare with the reference {reference}",
+            hint=f"choose among: {', '.join(entries)}",
         )
     return planned
 
@@ -141,10 +140,10 @@ class Bound:
         finally:
             self.seconds += time.perf_counter() - start
 
-    def at(self, q: Array) -> dict[int, Array]:
-        """Placement (4, 4) of each mapped frame this source has, by its index, at one q (n,)."""
-        T = matrices(mapped(components(self.raw(q[None, :])), self.view))[0]
-        return dict(zip(self.view.available, T, strict=True))
+    def mapped(self, q: Array) -> dict[int, Array]:
+        """Placements (N, 4, 4) of each mapped frame this source has, by its index, at q (N, n)."""
+        T = matrices(mapped(components(self.raw(q)), self.view))
+        return {frame: T[:, i] for i, frame in enumerate(self.view.available)}
 
 
 def bind(engine: Engine, model: RobotModel, offsets: Mapping[str, Array]) -> Bound:
@@ -155,7 +154,10 @@ def bind(engine: Engine, model: RobotModel, offsets: Mapping[str, Array]) -> Bou
     kind = engine.source.partition(":")[0]
     joint_map = model.joint_map(kind)
     if unknown := [j for j in engine.joints if j not in joint_map.names]:
-        raise EngineFailed(engine.source, f"has a joint {unknown[0]!r} that the description does not: {nearest(unknown[0], joint_map.names)}")
+        raise EngineFailed(
+            engine.source,
+            f"has a joint {unknown[0]!r} that the description does not: {nearest(unknown[0], joint_map.names)}",
+        )
     frames = model.frames.frames
     if kind == "dh":
         names = list(dict.fromkeys(f.dh for f in frames))
@@ -167,21 +169,25 @@ def bind(engine: Engine, model: RobotModel, offsets: Mapping[str, Array]) -> Bou
         raise EngineFailed(engine.source, f"does not have the base frame {base!r}")
     wanted = [f.urdf for f in frames]
     names = [name for name in dict.fromkeys(wanted) if name is not None and name in engine.frames]
-    slots = tuple(names.index(name) if name in names else -1 for name in wanted)  # type: ignore[arg-type]
+    slots = tuple(names.index(name) if name in names else -1 for name in wanted)
     missing = tuple(f.name for f in frames if f.urdf is not None and f.urdf not in names)
     view = View(slots, np.tile(np.eye(4), (len(frames), 1, 1)), names.index(base))
     return Bound(engine, joint_map, tuple(names), view, missing=missing)
 
 
 def measure_rigid(model: RobotModel, in_house: Bound, urdf_source: Bound, q: Array) -> dict[str, Array]:
-    """Offset of each rigid frame at one configuration: T_dh_link = T_base_dh^-1 T_base_link, by frame name.
+    """Offset of each rigid frame, by frame name: the mean of T_dh_link = T_base_dh^-1 T_base_link over q (N, n).
 
-    Frames whose placement is not finite there are left out.
+    A mean, not one configuration: there, an offset would absorb whatever discrepancy that configuration has, and show it
+    doubled elsewhere. Rotations are averaged in the chordal sense, by projecting the mean matrix on SO(3) (Moakher 2002,
+    doi:10.1137/S0895479801383877). Frames whose placements are not finite are left out.
     """
-    rigid = {i: f for i, f in enumerate(model.frames.frames) if f.relation == "rigid"}
-    T_base_dh, T_base_link = in_house.at(q), urdf_source.at(q)
+    T_base_dh, T_base_link = in_house.mapped(q), urdf_source.mapped(q)
     offsets = {}
-    for i, frame in rigid.items():
-        if i in T_base_link and np.isfinite(T_base_link[i]).all():
-            offsets[frame.name] = se3.inverse(T_base_dh[i]) @ T_base_link[i]
+    for i, frame in enumerate(model.frames.frames):
+        if frame.relation == "rigid" and i in T_base_link and np.isfinite(T_base_link[i]).all():
+            mean = (se3.inverse(T_base_dh[i]) @ T_base_link[i]).mean(axis=0)
+            U, _, Vt = np.linalg.svd(mean[:3, :3])
+            mean[:3, :3] = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+            offsets[frame.name] = mean
     return offsets

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from harness.analysis.components import (
     Components,
@@ -17,6 +19,8 @@ from harness.analysis.components import (
 )
 from harness.analysis.statistics import Stream
 from harness.se3 import Array
+
+Mask: TypeAlias = NDArray[np.bool_]
 
 CHUNK = 1024
 VALID = 1e-6
@@ -84,7 +88,7 @@ class Comparison:
 
     def _chunk(self, start: int, raw: Mapping[str, Array]) -> None:
         placed: dict[str, Components] = {}
-        usable: dict[str, Array | None] = {}
+        usable: dict[str, Mask | None] = {}
         for source, view in self.views.items():
             C = components(raw[source])
             good = self._check(source, start, raw[source], C)
@@ -98,17 +102,17 @@ class Comparison:
         if start < self.subset:
             self._all_pairs(start, placed, usable)
 
-    def _check(self, source: str, start: int, T: Array, C: Components) -> Array | None:
+    def _check(self, source: str, start: int, T: Array, C: Components) -> Mask | None:
         """Update validity. Returns None if all are valid, else a mask (F_raw, N)."""
         validity = self.validity[source]
         validity.checked += C.shape[0] * C.shape[3]
         residual = rotation_residual(C)
         worst = float(residual.max(initial=0.0))
-        last_row_ok = bool(np.array_equal(T[:, :, 3, :], np.broadcast_to([0.0, 0.0, 0.0, 1.0], T.shape[:2] + (4,))))
+        last_row_ok = bool(np.array_equal(T[:, :, 3, :], np.broadcast_to([0.0, 0.0, 0.0, 1.0], (*T.shape[:2], 4))))
         if worst <= VALID and last_row_ok and np.isfinite(C[:, 3].sum()):
             validity.residual = max(validity.residual, worst)
             return None
-        finite = np.isfinite(C).all(axis=(1, 2))
+        finite: Mask = np.asarray(np.isfinite(C).all(axis=(1, 2)))
         last = np.abs(T[:, :, 3, :] - [0.0, 0.0, 0.0, 1.0]).max(axis=2).T
         good = finite & (residual <= VALID) & (last <= VALID)
         validity.residual = max(validity.residual, float(np.where(finite, residual, 0.0).max(initial=0.0)))
@@ -119,14 +123,14 @@ class Comparison:
         return finite
 
     @staticmethod
-    def _usable(finite: Array, view: View) -> Array:
+    def _usable(finite: Mask, view: View) -> Mask:
         """Mask of mapped frames whose raw placement, and base, is finite: an invalid but finite one is still measured."""
-        mask = finite[[view.slots[f] for f in view.available]]
-        return mask if view.base is None else mask & finite[view.base]
+        mask: Mask = finite[[view.slots[f] for f in view.available]]
+        return mask if view.base is None else np.logical_and(mask, finite[view.base])
 
     def _common(
-        self, a: str, b: str, placed: Mapping[str, Components], usable: Mapping[str, Array | None]
-    ) -> tuple[list[int], Array, Array, Array | None]:
+        self, a: str, b: str, placed: Mapping[str, Components], usable: Mapping[str, Mask | None]
+    ) -> tuple[list[int], Array, Array, Mask | None]:
         """Frames both have, position and rotation errors there, and the mask of finite ones (None: all)."""
         have_a, have_b = self.views[a].available, self.views[b].available
         frames = [f for f in have_a if f in have_b]
@@ -136,11 +140,10 @@ class Comparison:
         masks = [m[rows] for m, rows in ((usable[a], rows_a), (usable[b], rows_b)) if m is not None]
         with np.errstate(invalid="ignore"):
             position, rotation = discrepancies(C_a, C_b)
-        return frames, position, rotation, np.logical_and.reduce(masks) if masks else None
+        mask: Mask | None = np.logical_and.reduce(masks) if masks else None
+        return frames, position, rotation, mask
 
-    def _pair(
-        self, start: int, a: str, b: str, placed: Mapping[str, Components], usable: Mapping[str, Array | None]
-    ) -> None:
+    def _pair(self, start: int, a: str, b: str, placed: Mapping[str, Components], usable: Mapping[str, Mask | None]) -> None:
         frames, position, rotation, mask = self._common(a, b, placed, usable)
         for stream, values in ((self.position[b], position), (self.rotation[b], rotation)):
             if len(frames) == self.frames:
@@ -152,7 +155,7 @@ class Comparison:
                 full[frames] = values
                 stream.update(start, full, valid)
 
-    def _all_pairs(self, start: int, placed: Mapping[str, Components], usable: Mapping[str, Array | None]) -> None:
+    def _all_pairs(self, start: int, placed: Mapping[str, Components], usable: Mapping[str, Mask | None]) -> None:
         stop = self.subset - start
         sources: Sequence[str] = list(self.views)
         for i, a in enumerate(sources):

@@ -68,7 +68,7 @@ def _relative(C: Components, base: Array) -> Components:
         return C
     shifted = C.copy()
     shifted[:, 3] -= base[3]
-    return np.einsum("rin,fkin->fkrn", base[:3], shifted)
+    return np.asarray(np.einsum("rin,fkin->fkrn", base[:3], shifted))
 
 
 def rotation_residual(C: Components) -> Array:
@@ -77,7 +77,7 @@ def rotation_residual(C: Components) -> Array:
     Zero exactly for rotations: x, y orthonormal and z = x cross y says R'R = I and det R = 1 at once. Shape (F, N).
     """
     x, y, z = C[:, 0], C[:, 1], C[:, 2]
-    residual = np.abs(np.einsum("frn,frn->fn", x, x) - 1.0)
+    residual: Array = np.abs(np.einsum("frn,frn->fn", x, x) - 1.0)
     np.maximum(residual, np.abs(np.einsum("frn,frn->fn", y, y) - 1.0), out=residual)
     np.maximum(residual, np.abs(np.einsum("frn,frn->fn", x, y)), out=residual)
     for r in range(3):

@@ -24,9 +24,7 @@ class Deviation:
     within: float
 
 
-def judge(
-    position: float, rotation: float, tolerance: tuple[float, float], deviation: Deviation | None
-) -> FrameVerdict:
+def judge(position: float, rotation: float, tolerance: tuple[float, float], deviation: Deviation | None) -> FrameVerdict:
     """Verdict on largest discrepancies `position` [m] and `rotation` [rad], tolerance (m, rad).
 
     A deviation on file behaves like a strict expected failure: bigger, smaller or gone is a failure.

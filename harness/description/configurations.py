@@ -78,10 +78,10 @@ class ConfigurationSet:
         """
         n = len(self.lower)
         first, last = start // CHUNK, (start + count + CHUNK - 1) // CHUNK
-        chunks = [np.empty((0, n))]
+        chunks: list[Array] = [np.empty((0, n))]
         for chunk in range(first, last):
             raw = np.random.Philox(key=np.array([seed, chunk], dtype=np.uint64)).random_raw(CHUNK * n)
-            chunks.append((np.asarray(raw) >> np.uint64(11)).reshape(CHUNK, n) * 2.0**-53)
+            chunks.append((np.asarray(raw, dtype=np.uint64) >> np.uint64(11)).reshape(CHUNK, n).astype(np.float64) * 2.0**-53)
         unit = np.concatenate(chunks)[start - first * CHUNK :][:count]
         return self.lower + unit * (self.upper - self.lower)
 
@@ -107,19 +107,24 @@ def resolve_configurations(
         key = f"configuration[{i}]"
         if len(entry.q) != len(table.joints):
             raise ModelFileError(
-                f"expected {len(table.joints)} values ({', '.join(table.joints)}), got {len(entry.q)}", where=path, key=f"{key}.q"
+                f"expected {len(table.joints)} values ({', '.join(table.joints)}), got {len(entry.q)}",
+                where=path,
+                key=f"{key}.q",
             )
         for j, claim in enumerate(entry.published):
             for which, label in (("dh", claim.dh), ("relative_to", claim.relative_to)):
                 if str(label) not in table.frames:
                     raise ModelFileError(
                         f"no DH frame {label!r}: expected base, 0 to {len(table.rows)}, or tool",
-                        where=path, key=f"{key}.published[{j}].{which}",
-                    )  # fmt: skip
+                        where=path,
+                        key=f"{key}.published[{j}].{which}",
+                    )
         configuration = Configuration(
-            entry.name, _radians(entry, table), entry.provenance,
+            entry.name,
+            _radians(entry, table),
+            entry.provenance,
             tuple(Published.from_entry(claim, entry.unit) for claim in entry.published),
-        )  # fmt: skip
+        )
         if entry.name == "zero" and not configuration.q.any():
             fixed[0] = configuration
         elif entry.name in {c.name for c in fixed}:
@@ -163,7 +168,9 @@ def _ranges(
     for joint in table.joints:
         if joint not in ranges:
             raise ModelFileError(
-                f"prismatic joint {joint!r} has no range", where=path, key="random.limits",
+                f"prismatic joint {joint!r} has no range",
+                where=path,
+                key="random.limits",
                 hint=f"add [random.limits] {joint} = [lower, upper] in metres",
-            )  # fmt: skip
+            )
     return ranges

@@ -123,16 +123,12 @@ def _header(cells: list[str], path: Path, line: int) -> list[str]:
     for cell in (c.strip() for c in cells):
         column = _NAMES.get(cell, cell)
         if column not in _COLUMNS:
-            raise ModelFileError(
-                f"unknown column {cell!r}", where=path, line=line, hint=nearest(cell, (*_COLUMNS, *_NAMES))
-            )
+            raise ModelFileError(f"unknown column {cell!r}", where=path, line=line, hint=nearest(cell, (*_COLUMNS, *_NAMES)))
         if column in columns:
             raise ModelFileError(f"column {cell!r} is there twice", where=path, line=line)
         columns.append(column)
     if missing := [c for c in _COLUMNS if c not in columns and c not in ("type", "theta")]:
-        raise ModelFileError(
-            f"column {missing[0]!r} is missing", where=path, line=line, hint=f"header: {','.join(_COLUMNS)}"
-        )
+        raise ModelFileError(f"column {missing[0]!r} is missing", where=path, line=line, hint=f"header: {','.join(_COLUMNS)}")
     return columns
 
 

@@ -4,7 +4,7 @@ Four kinds of entry (design: one table `[[frame]]` each):
     dh + urdf                  the same frame under two names
     dh + urdf + xyz/rpy        the URDF link at a declared constant offset from the DH frame
     urdf + of + xyz/rpy        the URDF link at a declared constant offset from another entry
-    dh + urdf + rigid = true   on the same body; the offset is measured once and must stay constant
+    dh + urdf + rigid = true   on the same body; the offset is measured and must stay constant
 An entry without `urdf` is compared among DH sources only.
 """
 
@@ -119,8 +119,9 @@ def resolve_frames(file: FramesFile, table: DHTable, urdf: Urdf | None, path: Pa
             if entry.urdf not in urdf.links:
                 raise MappingError(
                     f"no link {entry.urdf!r} in {urdf.path.name}; {nearest(entry.urdf, urdf.links)}",
-                    where=path, key=f"{key}.urdf",
-                )  # fmt: skip
+                    where=path,
+                    key=f"{key}.urdf",
+                )
             _once(taken, ("urdf", entry.urdf), i, path, f"{key}.urdf", f"link {entry.urdf!r}")
         mapped = _resolve(entry, i, file, table, path)
         if mapped.relation == "identical":
@@ -147,9 +148,11 @@ def _resolve(entry: FrameEntry, i: int, file: FramesFile, table: DHTable, path: 
             raise MappingError(f"frames refer to each other in a circle: {' -> '.join([*seen, target.name])}", where=path)
         if target.rigid:
             raise MappingError(
-                f"{target.name!r} is rigid, its own offset is not declared", where=path, key=f"frame[{i}].of",
+                f"{target.name!r} is rigid, its own offset is not declared",
+                where=path,
+                key=f"frame[{i}].of",
                 hint="give this entry dh and rigid = true instead",
-            )  # fmt: skip
+            )
         offset, current = target.offset @ offset, target
         seen.append(current.name)
     label = str(current.dh)

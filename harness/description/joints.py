@@ -45,9 +45,7 @@ def identity_map(table: DHTable) -> JointMap:
     return JointMap(table.joints, np.eye(n), np.zeros(n))
 
 
-def resolve_joints(
-    entries: Mapping[str, JointEntry], table: DHTable, urdf: Urdf, frames: FrameMap, path: Path
-) -> JointMap:
+def resolve_joints(entries: Mapping[str, JointEntry], table: DHTable, urdf: Urdf, frames: FrameMap, path: Path) -> JointMap:
     """Match model joints to URDF joints and check that the counts fit on the mapped chain.
 
     Raises MappingError (unknown, doubled or unmatched joints) or UrdfError (floating or planar on the chain).
@@ -63,8 +61,9 @@ def resolve_joints(
         if joint.name in source:
             raise MappingError(
                 f"URDF joint {joint.name!r} is mapped twice: by {source[joint.name]!r} and {name!r}",
-                where=path, key=f"joints.{name}",
-            )  # fmt: skip
+                where=path,
+                key=f"joints.{name}",
+            )
         source[joint.name] = name
         row = np.zeros(len(table.joints))
         row[index] = entry.sign
@@ -87,10 +86,14 @@ def _target(name: str, entry: JointEntry, table: DHTable, urdf: Urdf, path: Path
     if joint.type not in MOVABLE:
         raise MappingError(f"URDF joint {joint.name!r} is {joint.type}, it takes no value", where=path, key=f"joints.{name}")
     if joint.mimic is not None:
-        raise MappingError(f"URDF joint {joint.name!r} is a follower: map {joint.mimic.joint!r}", where=path, key=f"joints.{name}")
+        raise MappingError(
+            f"URDF joint {joint.name!r} is a follower: map {joint.mimic.joint!r}", where=path, key=f"joints.{name}"
+        )
     if (joint.type == "prismatic") != (table.kind(name) == "prismatic"):
         raise MappingError(
-            f"{name!r} is {table.kind(name)} in dh.csv, {joint.name!r} is {joint.type} in the URDF", where=path, key=f"joints.{name}"
+            f"{name!r} is {table.kind(name)} in dh.csv, {joint.name!r} is {joint.type} in the URDF",
+            where=path,
+            key=f"joints.{name}",
         )
     return joint
 
@@ -107,23 +110,27 @@ def _check_chain(source: Mapping[str, str], urdf: Urdf, frames: FrameMap, path: 
         if joint.type in UNSUPPORTED:
             raise UrdfError(
                 f"joint {joint.name!r} on the chain is {joint.type}: expected revolute, continuous, prismatic or fixed",
-                where=urdf.path, line=joint.line, hint="no DH row can describe it; map frames on one side of it only",
-            )  # fmt: skip
+                where=urdf.path,
+                line=joint.line,
+                hint="no DH row can describe it; map frames on one side of it only",
+            )
         leader = _leader(urdf, joint)
         if joint.type in MOVABLE and leader.name not in source:
             moved = sum(j.type in MOVABLE and j.mimic is None for j in on_chain.values())
             raise MappingError(
                 f"URDF joint {leader.name!r} moves a mapped link, but no model joint drives it: dh.csv has {len(source)} "
                 f"joints, the chain has {moved}; {nearest(leader.name, source.values())}",
-                where=path, key="joints",
-            )  # fmt: skip
+                where=path,
+                key="joints",
+            )
     leaders = {_leader(urdf, j).name for j in on_chain.values()}
     for joint_name, name in source.items():
         if joint_name not in leaders:
             raise MappingError(
                 f"{joint_name!r} moves none of the mapped links: dh.csv and the chain do not have the same joints",
-                where=path, key=f"joints.{name}",
-            )  # fmt: skip
+                where=path,
+                key=f"joints.{name}",
+            )
 
 
 def _leader(urdf: Urdf, joint: UrdfJoint) -> UrdfJoint:

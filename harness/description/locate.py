@@ -49,7 +49,9 @@ def locate_urdf(file: str, package: str | None, folder: Path) -> Path:
             if candidate.is_file():
                 return candidate
         present = [p.name for c in candidates[1:] if c.parent.is_dir() for p in c.parent.iterdir()]
-        raise ModelFileError(f"no URDF {file!r} under urdf/; {nearest(file, present)}", where=folder / "model.toml", key="urdf.file")
+        raise ModelFileError(
+            f"no URDF {file!r} under urdf/; {nearest(file, present)}", where=folder / "model.toml", key="urdf.file"
+        )
     try:
         files = metadata.files(package) or []
     except metadata.PackageNotFoundError:

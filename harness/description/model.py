@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -16,7 +15,8 @@ from harness.description.frames import FrameMap, FramesFile, resolve_frames
 from harness.description.joints import JointMap, identity_map, random_limits, resolve_joints
 from harness.description.locate import locate_urdf
 from harness.description.toml_file import read_toml
-from harness.description.urdf import Urdf, read_urdf
+from harness.description.urdf import Urdf
+from harness.description.urdf_file import read_urdf
 from harness.description.urdf_lint import Finding, check
 from harness.description.values import Number, Strict, Transform
 from harness.errors import MappingError, ModelFileError, nearest
@@ -69,10 +69,12 @@ class AcceptedEntry(Strict):
 
     @property
     def sources(self) -> list[str]:
+        """The sources as a list."""
         return [self.source] if isinstance(self.source, str) else self.source
 
     @property
     def frames(self) -> list[str]:
+        """The frames as a list."""
         return [self.frame] if isinstance(self.frame, str) else self.frame
 
 
@@ -115,6 +117,7 @@ class RobotModel:
 
     @property
     def name(self) -> str:
+        """Name of the model, as in reports."""
         return self.file.name
 
     def joint_map(self, kind: str) -> JointMap:
@@ -161,7 +164,9 @@ def load_model(folder: Path) -> RobotModel:
     )
     if not table.joints:
         raise ModelFileError("expected at least one joint that moves, every row is fixed", where=paths["dh.csv"])
-    urdf, findings, urdf_path = None, (), None
+    urdf: Urdf | None = None
+    findings: tuple[Finding, ...] = ()
+    urdf_path: Path | None = None
     if file.urdf is not None:
         urdf_path = locate_urdf(file.urdf.file, file.urdf.package, folder)
         urdf = read_urdf(urdf_path)

@@ -57,7 +57,11 @@ def _names(urdf: Urdf) -> Iterator[Finding]:
                 counts[item.name] = 0
                 what = code.removeprefix("duplicate-")
                 yield Finding(
-                    code, "error", item.name, f"{what} name {item.name!r} is used on lines {', '.join(lines)}", item.line
+                    code,
+                    "error",
+                    item.name,
+                    f"{what} name {item.name!r} is used on lines {', '.join(lines)}",
+                    item.line,
                 )
 
 
@@ -153,5 +157,7 @@ def _numbers(joint: UrdfJoint) -> Iterator[Finding]:
             continue
         for word in dict.fromkeys(text.split()):
             if truncation := find_truncation(word):
-                message = f"joint {joint.name!r} {where}: {word} is {truncation.exact} cut short, off by {truncation.error:.1e} rad"
+                message = (
+                    f"joint {joint.name!r} {where}: {word} is {truncation.exact} cut short, off by {truncation.error:.1e} rad"
+                )
                 yield Finding("truncated-pi", "note", joint.name, message, joint.line)

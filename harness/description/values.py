@@ -32,9 +32,7 @@ def parse_number(value: object) -> float:
         try:
             number = float(text)
         except ValueError:
-            raise ValueError(
-                f"expected a number or a multiple of pi such as 'pi/2' or '3*pi/4', got {value!r}"
-            ) from None
+            raise ValueError(f"expected a number or a multiple of pi such as 'pi/2' or '3*pi/4', got {value!r}") from None
     else:
         number = float(value)
     if not math.isfinite(number):

@@ -49,6 +49,7 @@ class Engine(ABC):
     joints: tuple[str, ...]
     frames: tuple[str, ...]
 
+    @abstractmethod
     def __init__(self, description: Any) -> None:
         """Build the library's model. Raises EngineUnavailable if it is not installed, EngineFailed if it refuses."""
 

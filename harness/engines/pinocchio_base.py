@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -16,7 +16,7 @@ class PinocchioEngine(Engine):
     """Forward kinematics of a `pinocchio.Model`. Subclasses build `model` and name its frames."""
 
     requirements = ("pin>=3.9",)
-    traits = (
+    traits: ClassVar[tuple[Trait, ...]] = (
         Trait(
             "joints-alphabetical",
             "joints are ordered alphabetically below each link, not as written",

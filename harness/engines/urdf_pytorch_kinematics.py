@@ -55,9 +55,7 @@ class UrdfPytorchKinematics(Engine):
                 chain = pk.build_chain_from_urdf(description.text.encode())
                 self._chain = chain.to(dtype=self._torch.float64, device="cpu")
         except Exception as error:  # the parser raises whatever its own code happens to hit
-            raise EngineFailed(
-                self.source, f"build_chain_from_urdf refused the URDF: {type(error).__name__}: {error}"
-            ) from error
+            raise EngineFailed(self.source, f"build_chain_from_urdf refused the URDF: {type(error).__name__}: {error}") from error
         self.joints = tuple(self._chain.get_joint_parameter_names())
         self.frames = tuple(self._chain.get_frame_names(exclude_fixed=False))
 

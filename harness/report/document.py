@@ -5,16 +5,9 @@ Units are metres and radians. Everything that varies between two equal runs (tim
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-
-from harness.errors import InputError
-
-FORMAT = "fk-crosscheck report"
-VERSION = "1.0"
+from pydantic import BaseModel, ConfigDict, Field
 
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -134,7 +127,7 @@ class Source(Part):
 
 
 class Frame(Part):
-    """One mapped frame. `offset` is T_dh_frame: declared, or measured at the first configuration if rigid."""
+    """One mapped frame. `offset` is T_dh_frame: declared, or if rigid the mean over 1024 random configurations."""
 
     name: str
     dh: str
@@ -186,12 +179,13 @@ class Lint(Part):
 
 
 class Robot(Part):
-    """The robot model the report is about."""
+    """The robot model the report is about. Placements are expressed in the frame `base`."""
 
     name: str
     description: str
     convention: Literal["standard", "modified"]
     provenance: dict[str, str]
+    base: str
     joints: list[str]
     lower: list[Finite]
     upper: list[Finite]
@@ -235,8 +229,8 @@ class Environment(Part):
 class Report(Part):
     """The whole document."""
 
-    format: Literal["fk-crosscheck report"] = FORMAT
-    version: Literal["1.0"] = VERSION
+    format: Literal["fk-crosscheck report"] = "fk-crosscheck report"
+    version: Literal["1.0"] = "1.0"
     robot: Robot
     settings: Settings
     verdict: Verdict
@@ -247,38 +241,3 @@ class Report(Part):
     published: list[PublishedResult]
     lint: list[Lint]
     environment: Environment
-
-
-def schema() -> dict[str, Any]:
-    """JSON Schema (draft 2020-12) of the document, generated from the types."""
-    generated = Report.model_json_schema(mode="serialization")
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **generated}
-
-
-def to_json(report: Report) -> str:
-    """The document as JSON text."""
-    return report.model_dump_json(indent=2) + "\n"
-
-
-def read_report(path: Path) -> Report:
-    """Read a report document. Raises InputError if it cannot be read or is not one of this version."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot be read: {getattr(error, 'strerror', None) or error}", where=path) from None
-    try:
-        data = json.loads(text)
-    except ValueError as error:
-        raise InputError(f"not JSON: {error}", where=path) from None
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise InputError(f"expected a document with \"format\": \"{FORMAT}\"", where=path)
-    if data.get("version") != VERSION:
-        raise InputError(
-            f"expected report version {VERSION}, got {data.get('version')!r}", where=path, hint="run the cross-check again"
-        )
-    try:
-        return Report.model_validate(data)
-    except ValidationError as failure:
-        first = failure.errors(include_url=False)[0]
-        key = ".".join(str(step) for step in first["loc"])
-        raise InputError(f"not a report: {first['msg']}", where=path, key=key) from None

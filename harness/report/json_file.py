@@ -1,0 +1,52 @@
+"""The report document as JSON: its schema, writing it, and reading one back."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from harness.errors import InputError
+from harness.report.document import Report
+
+FORMAT = Report.model_fields["format"].default
+VERSION = Report.model_fields["version"].default
+
+
+def schema() -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of the document, generated from the types."""
+    generated = Report.model_json_schema(mode="serialization")
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **generated}
+
+
+def to_json(report: Report) -> str:
+    """The document as JSON text."""
+    return report.model_dump_json(indent=2) + "\n"
+
+
+def read_report(path: Path) -> Report:
+    """Read a report document. Raises InputError if it cannot be read or is not one of this version."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot be read: {getattr(error, 'strerror', None) or error}", where=path) from None
+    try:
+        data = json.loads(text)
+    except ValueError as error:
+        raise InputError(f"not JSON: {error}", where=path) from None
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise InputError(f'expected a document with "format": "{FORMAT}"', where=path)
+    if data.get("version") != VERSION:
+        raise InputError(
+            f"expected report version {VERSION}, got {data.get('version')!r}",
+            where=path,
+            hint="run the cross-check again",
+        )
+    try:
+        return Report.model_validate(data)
+    except ValidationError as failure:
+        first = failure.errors(include_url=False)[0]
+        key = ".".join(str(step) for step in first["loc"])
+        raise InputError(f"not a report: {first['msg']}", where=path, key=key) from None

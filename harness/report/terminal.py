@@ -1,0 +1,78 @@
+"""The report as a person reads it in a terminal."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from harness.report.document import Report, Source
+from harness.report.text import metres, numbers, plain, radians
+
+_STYLE = {0: "bold green", 1: "bold red", 3: "bold yellow"}
+MAX_REASONS = 6
+_WORD = {0: "PASS", 1: "FAIL", 3: "INCOMPLETE"}
+
+
+def show(report: Report, console: Console) -> None:
+    """Print verdict, one row a source, and where each disagreement is."""
+    code = report.verdict.exit_code
+    console.print(Text(_WORD[code], style=_STYLE[code]), Text(plain(report.verdict.sentence)), soft_wrap=True)
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
+    for column in ("source", "verdict", "worst frame", "position", "rotation", "tolerance", "size of"):
+        table.add_column(column, overflow="fold")
+    for source in report.sources:
+        if not source.reference:
+            table.add_row(*_row(source))
+    console.print(table)
+    for source in report.sources:
+        _located(source, report.settings.reference, console)
+    for reason in report.verdict.reasons[1:MAX_REASONS]:
+        console.print(Text(f"  also: {plain(reason)}"), soft_wrap=True)
+    if (more := len(report.verdict.reasons) - MAX_REASONS) > 0:
+        console.print(Text(f"  and {more} more reasons in the report"))
+    wrong = [p for p in report.published if p.found == "wrong"]
+    if report.published:
+        note = f"  published placements: {len(report.published) - len(wrong)} hold, {len(wrong)} wrong"
+        as_filed = all(p.found == p.status for p in report.published)
+        console.print(Text(note + (" (as filed)" if as_filed else ""), style="" if as_filed else "red"))
+    if report.unmapped:
+        console.print(Text(f"  not mapped, so not checked: {plain(', '.join(report.unmapped))}", style="yellow"), soft_wrap=True)
+
+
+def _row(source: Source) -> tuple[Text, ...]:
+    good = source.verdict in ("agrees", "agrees as accepted", "reference")
+    verdict = Text(source.verdict, style="green" if good else "yellow" if source.verdict == "not run" else "red")
+    name = Text(plain(source.name))
+    if not source.frames:
+        install = f" ({source.install})" if source.install else ""
+        return name, verdict, Text(""), Text(""), Text(""), Text(""), Text(plain(source.reason + install))
+    frame = next(f for f in source.frames if f.frame == source.worst_frame)
+    return (
+        name,
+        verdict,
+        Text(plain(frame.frame)),
+        Text(metres(frame.position.max)),
+        Text(radians(frame.rotation.max)),
+        Text(f"{metres(source.tolerance.position)}, {radians(source.tolerance.rotation)}"),
+        Text(source.noise_text),
+    )
+
+
+def _located(source: Source, reference: str, console: Console) -> None:
+    """The frame, the configuration and the evidence of one disagreement."""
+    if source.verdict in ("agrees", "agrees as accepted", "reference"):
+        return
+    if source.first_disagreeing_frame:
+        console.print(
+            Text(f"  {source.name}: first frame that disagrees: {plain(source.first_disagreeing_frame)}"),
+            soft_wrap=True,
+        )
+    if r := source.reproducer:
+        p_a = numbers([row[3] for row in r.reference_placement[:3]])
+        p_b = numbers([row[3] for row in r.source_placement[:3]])
+        where = f"  {source.name}: {plain(r.frame)} at q = {numbers(r.q)} is {metres(r.position)}, {radians(r.rotation)} off"
+        console.print(Text(where), soft_wrap=True)
+        console.print(Text(f"    {reference} has it at {p_a}, {source.name} at {p_b}"), soft_wrap=True)
+    for text in source.explained_by:
+        console.print(Text(f"    known: {plain(text)}"), soft_wrap=True)

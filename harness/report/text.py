@@ -1,0 +1,34 @@
+"""Numbers and names as people read them; shared by every format."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+
+# C0 and C1 controls, line separators and bidirectional overrides: they change more than their own letters.
+_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
+
+
+def plain(text: str) -> str:
+    """`text` on one line, every control character replaced by U+FFFD: safe on a terminal and in XML."""
+    return _CONTROL.sub("\ufffd", text.replace("\n", " ").replace("\t", " "))
+
+
+def metres(x: float) -> str:
+    """`0.301 mm` from a tenth of a millimetre up, `5.3e-12 m` below."""
+    if x == 0.0:
+        return "0 m"
+    return f"{x * 1000:.3f} mm" if 1e-4 <= x < 1.0 else f"{x:.4g} m" if x >= 1.0 else f"{x:.1e} m"
+
+
+def radians(x: float) -> str:
+    """`1.25 deg` from 1e-4 rad up, `2.0e-11 rad` below."""
+    if x == 0.0:
+        return "0 rad"
+    return f"{math.degrees(x):.3g} deg" if x >= 1e-4 else f"{x:.1e} rad"
+
+
+def numbers(values: Iterable[float], digits: int = 6) -> str:
+    """`[0.2, -1.1, 0]`."""
+    return "[" + ", ".join(f"{0.0 if v == 0 else v:.{digits}g}" for v in values) + "]"

@@ -1,0 +1,85 @@
+"""Every step of CI, to be run at home: `nox -s crosscheck`, `tests`, `matrix`, `lint`, `types`, `bench`."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from pathlib import Path
+
+import nox
+
+nox.needs_version = ">=2024.3.2"
+nox.options.default_venv_backend = "virtualenv"  # pip: the pinned CPU build of torch is found by pip alone
+nox.options.sessions = ["lint", "types", "tests", "crosscheck"]
+
+NEWEST_PIN = "4.1.0"
+PINS = ("3.9.0", NEWEST_PIN)
+PYTHONS = ("3.10", "3.11", "3.12", "3.13")
+WITH_TORCH = "3.11"  # the Python that constraints.txt has a CPU build of torch for
+
+CONSTRAINTS = "--constraint=constraints.txt"
+
+
+def found_pythons() -> list[str]:
+    """Interpreters of the test matrix that are there: on the PATH, or installed under pyenv."""
+    pyenv = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")) / "versions"
+    found = []
+    for version in PYTHONS:
+        candidates = [str(p) for p in sorted(pyenv.glob(f"{version}.*/bin/python{version}"))]
+        path = shutil.which(f"python{version}")
+        # A pyenv shim is on the PATH for every version, and fails for those that are not switched on.
+        if path and ".pyenv" not in path:
+            candidates.append(path)
+        if f"{sys.version_info.major}.{sys.version_info.minor}" == version:
+            candidates.insert(0, sys.executable)
+        found += candidates[:1]
+    return found
+
+
+@nox.session
+def crosscheck(session: nox.Session) -> None:
+    """Cross-check all robots with all engines; reports go to reports/."""
+    session.install(CONSTRAINTS, f"pin=={NEWEST_PIN}", ".[all]")
+    session.run("crosscheck", "run", "--samples", "10000", "--out", "reports", *session.posargs)
+
+
+@nox.session
+def tests(session: nox.Session) -> None:
+    """The test suite on this Python with the newest pin."""
+    session.install(CONSTRAINTS, f"pin=={NEWEST_PIN}", "--editable", ".[all,test]")
+    session.run("pytest", *session.posargs)
+
+
+@nox.session(python=found_pythons())
+@nox.parametrize("pin", PINS)
+def matrix(session: nox.Session, pin: str) -> None:
+    """The test suite on every Python found, with the oldest and the newest pin supported."""
+    extras, env = "all,test", {}
+    if f"python{WITH_TORCH}" not in str(session.python) and f"/{WITH_TORCH}" not in str(session.python):
+        extras = "pinocchio,yourdfpy,robots,test"
+        env = {"CROSSCHECK_TESTS_WITHOUT": "urdf:pytorch-kinematics"}
+    session.install(CONSTRAINTS, f"pin=={pin}", "--editable", f".[{extras}]")
+    session.run("pytest", "-q", *session.posargs, env=env)
+
+
+@nox.session
+def lint(session: nox.Session) -> None:
+    """Style: ruff's checks and its formatting."""
+    session.install(CONSTRAINTS, "ruff")
+    session.run("ruff", "check", ".")
+    session.run("ruff", "format", "--check", ".")
+
+
+@nox.session
+def types(session: nox.Session) -> None:
+    """Types: mypy, strict."""
+    session.install(CONSTRAINTS, "mypy", "nox", ".[test]")
+    session.run("mypy")
+
+
+@nox.session
+def bench(session: nox.Session) -> None:
+    """Speed and memory, as ratios within one run; fails if a target is missed."""
+    session.install(CONSTRAINTS, f"pin=={NEWEST_PIN}", ".[all]")
+    session.run("python", "bench/bench.py", *session.posargs)
