@@ -14,6 +14,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
+import pytorch_kinematics as pk
+import torch
 
 from harness.crosscheck import crosscheck
 from harness.description.locate import default_models_dir, find_model
@@ -37,8 +40,6 @@ def seconds(work: Callable[[], object]) -> float:
 
 def pinocchio_loop(text: str, q: Any) -> Callable[[], object]:
     """A Python loop over framesForwardKinematics that reads six placements, as its users write it."""
-    import pinocchio as pin
-
     model = pin.buildModelFromXML(text)
     data = model.createData()
     ids = [model.getFrameId(name, pin.FrameType.BODY) for name in LINKS]
@@ -56,9 +57,6 @@ def pinocchio_loop(text: str, q: Any) -> Callable[[], object]:
 
 def pytorch_chain(text: str, q: Any, batch: int) -> Callable[[], object]:
     """pytorch-kinematics' chain on the CPU in float64, in batches, reading six placements."""
-    import pytorch_kinematics as pk
-    import torch
-
     chain = pk.build_chain_from_urdf(text.encode()).to(dtype=torch.float64)
     indices = chain.get_frame_indices(*LINKS)
     tensor = torch.from_numpy(q)

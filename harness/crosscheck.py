@@ -104,14 +104,18 @@ def _bound(participant: Participant) -> Bound:
 
 
 def _reproduce(results: Results, comparison: Comparison) -> dict[str, Reproduced]:
-    """For each source outside tolerance, its worst configuration at its worst frame, shrunk."""
-    reference = results.participants[0]
+    """For each source outside tolerance its worst configuration, shrunk; at a frame of declared offset if one disagrees."""
+    reference, frames = results.participants[0], results.model.frames.frames
+    # A rigid frame shows a change of its offset, at any q; one at a declared offset shows the discrepancy itself.
+    declared = [i for i, frame in enumerate(frames) if frame.relation != "rigid"]
     found: dict[str, Reproduced] = {}
     for participant in results.participants[1:]:
         if participant.bound is None:
             continue
         tolerance = pair_tolerance(participant.planned, reference.planned)
-        worst = comparison.worst(participant.name, tolerance)
+        worst = comparison.worst(participant.name, tolerance, declared) or comparison.worst(
+            participant.name, tolerance, range(len(frames))
+        )
         if worst is None:
             continue
         frame, index = worst

@@ -82,9 +82,11 @@ class Comparison:
     def update(self, start: int, raw: Mapping[str, Array]) -> None:
         """Compare configurations `start` ...: raw placements (N, F_raw, 4, 4) of every source still in `views`."""
         count = raw[self.reference].shape[0]
-        for offset in range(0, count, CHUNK):
-            part = slice(offset, min(offset + CHUNK, count))
-            self._chunk(start + offset, {source: raw[source][part] for source in self.views})
+        # An engine may return anything: what is not finite is masked and counted, not warned about.
+        with np.errstate(invalid="ignore", over="ignore"):
+            for offset in range(0, count, CHUNK):
+                part = slice(offset, min(offset + CHUNK, count))
+                self._chunk(start + offset, {source: raw[source][part] for source in self.views})
 
     def _chunk(self, start: int, raw: Mapping[str, Array]) -> None:
         placed: dict[str, Components] = {}
@@ -138,8 +140,7 @@ class Comparison:
         C_a = placed[a] if frames == have_a else placed[a][rows_a]
         C_b = placed[b] if frames == have_b else placed[b][rows_b]
         masks = [m[rows] for m, rows in ((usable[a], rows_a), (usable[b], rows_b)) if m is not None]
-        with np.errstate(invalid="ignore"):
-            position, rotation = discrepancies(C_a, C_b)
+        position, rotation = discrepancies(C_a, C_b)
         mask: Mask | None = np.logical_and.reduce(masks) if masks else None
         return frames, position, rotation, mask
 
@@ -171,12 +172,11 @@ class Comparison:
                         setattr(pair, name, float(seen[worst].max()))
                         setattr(pair, f"{name}_frame", frames[worst])
 
-    def worst(self, source: str, tolerance: tuple[float, float]) -> tuple[int, int] | None:
-        """(frame, configuration index) furthest outside tolerance (m, rad), None if all are inside."""
+    def worst(self, source: str, tolerance: tuple[float, float], frames: Sequence[int]) -> tuple[int, int] | None:
+        """(frame, configuration index) furthest outside tolerance (m, rad) among `frames`, None if all are inside."""
         best, where = 1.0, None
         for stream, limit in ((self.position[source], tolerance[0]), (self.rotation[source], tolerance[1])):
-            ratios = stream.max / limit
-            frame = int(ratios.argmax())
-            if ratios[frame] > best:
-                best, where = float(ratios[frame]), (frame, int(stream.argmax[frame]))
+            for frame in frames:
+                if (ratio := float(stream.max[frame]) / limit) > best:
+                    best, where = ratio, (frame, int(stream.argmax[frame]))
         return where

@@ -158,7 +158,7 @@ def _resolve(entry: FrameEntry, i: int, file: FramesFile, table: DHTable, path: 
     label = str(current.dh)
     if label not in table.frames:
         raise MappingError(
-            f"no DH frame {label!r}: expected base, 0 to {len(table.rows)}, or tool", where=path, key=f"frame[{i}].dh"
+            f"no DH frame {label!r} in dh.csv: expected base, 0 to {len(table.rows)}, or tool", where=path, key=f"frame[{i}].dh"
         )
     if entry.rigid:
         return MappedFrame(entry.name, label, entry.urdf, "rigid", None, None)

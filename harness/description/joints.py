@@ -82,7 +82,8 @@ def _target(name: str, entry: JointEntry, table: DHTable, urdf: Urdf, path: Path
     joint = urdf.joints.get(wanted)
     if joint is None:
         hint = nearest(wanted, urdf.movable)
-        raise MappingError(f"no joint {wanted!r} in {urdf.path.name}; {hint}", where=path, key=f"joints.{name}")
+        what = f"no joint {wanted!r}" if entry.urdf else f"joint {name!r} of dh.csv is not"
+        raise MappingError(f"{what} in {urdf.path.name}; {hint}", where=path, key=f"joints.{name}")
     if joint.type not in MOVABLE:
         raise MappingError(f"URDF joint {joint.name!r} is {joint.type}, it takes no value", where=path, key=f"joints.{name}")
     if joint.mimic is not None:

@@ -1,0 +1,73 @@
+"""Fixtures: robot models in a folder of their own that a test may break, and the engines that must be there."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+from harness.description.locate import default_models_dir
+from harness.description.model import RobotModel, load_model
+
+settings.register_profile("default", deadline=None, max_examples=50)
+settings.load_profile("default")
+
+# Engines a run of the tests does without, said aloud by whoever runs them (nox -s matrix); any other must be installed.
+WITHOUT = set(filter(None, os.environ.get("CROSSCHECK_TESTS_WITHOUT", "").split(",")))
+
+Edit = tuple[str, str, str]
+
+
+def engines(*sources: str) -> list[object]:
+    """Parameters for a test over engines; those declared absent are shown as skipped."""
+    absent = pytest.mark.skipif
+    return [pytest.param(s, marks=absent(s in WITHOUT, reason="declared absent")) for s in sources]
+
+
+@pytest.fixture
+def copy_model(tmp_path: Path) -> Callable[..., Path]:
+    """Copy one packaged model to a models/ folder, edited: (file, old text, new text) or (file, "", all of it)."""
+
+    def copy(robot: str, *edits: Edit) -> Path:
+        models, urdf = tmp_path / "models", tmp_path / "urdf"
+        shutil.copytree(default_models_dir() / robot, models / robot)
+        if not urdf.exists():
+            shutil.copytree(default_models_dir().parent / "urdf", urdf)
+        for name, old, new in edits:
+            path = urdf / name if name.endswith(".urdf") else models / robot / name
+            text = path.read_text()
+            assert old in text, f"{old!r} is not in {name}"
+            path.write_text(text.replace(old, new) if old else new)
+        return models / robot
+
+    return copy
+
+
+@pytest.fixture(scope="session")
+def models() -> dict[str, RobotModel]:
+    """Every packaged robot model, by folder name."""
+    return {path.parent.name: load_model(path.parent) for path in sorted(default_models_dir().glob("*/model.toml"))}
+
+
+@pytest.fixture
+def cli(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Run `crosscheck ARGS` in a process of its own, in tmp_path, and return what it printed."""
+
+    def run(*args: str, **env: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "harness", *args],
+            cwd=tmp_path,
+            env={**os.environ, **env},
+            capture_output=True,
+            text=True,
+            timeout=180,
+            check=False,
+        )
+
+    return run

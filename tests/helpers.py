@@ -1,0 +1,54 @@
+"""Comparing placements so that a failure says where, and Hypothesis strategies for tables and transforms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from hypothesis import strategies as st
+
+from harness import se3
+from harness.description.dh import DHRow, DHTable
+from harness.se3 import Array
+
+
+def assert_placements_close(got: Array, expected: Array, atol: float) -> None:
+    """Equal shapes, nothing that is not finite, every entry within `atol`; else names the worst entry."""
+    assert got.shape == expected.shape, f"shape {got.shape}, expected {expected.shape}"
+    assert np.isfinite(got).all(), f"{np.count_nonzero(~np.isfinite(got))} entries are not finite"
+    assert np.isfinite(expected).all(), "the expected values are not finite"
+    difference = np.abs(got - expected)
+    if difference.size and difference.max() > atol:
+        worst = np.unravel_index(difference.argmax(), difference.shape)
+        raise AssertionError(f"entry {worst} is {got[worst]!r}, expected {expected[worst]!r}: off by {difference[worst]:.3g}")
+
+
+# Right angles are what tables are made of, and where shortcuts go wrong.
+angles = st.one_of(
+    st.sampled_from([0.0, math.pi / 2, -math.pi / 2, math.pi, -math.pi]),
+    st.floats(-4.0, 4.0, allow_nan=False),
+)
+lengths = st.one_of(st.just(0.0), st.floats(-2.0, 2.0, allow_nan=False))
+transforms = st.builds(se3.from_xyz_rpy, st.tuples(lengths, lengths, lengths), st.tuples(angles, angles, angles))
+
+
+@st.composite
+def tables(draw: st.DrawFn, max_rows: int = 6) -> DHTable:
+    """Random DH tables: both conventions, all kinds of rows, base and tool transforms; at least one joint."""
+    kinds = draw(st.lists(st.sampled_from(["revolute", "prismatic", "fixed"]), min_size=1, max_size=max_rows))
+    if all(kind == "fixed" for kind in kinds):
+        kinds[0] = "revolute"
+    rows = tuple(
+        DHRow(f"j{i}", kind, draw(lengths), draw(angles), draw(lengths), draw(angles))  # type: ignore[arg-type]
+        for i, kind in enumerate(kinds)
+    )
+    return DHTable(rows, draw(st.sampled_from(["standard", "modified"])), draw(transforms), draw(transforms))
+
+
+@st.composite
+def tables_with_q(draw: st.DrawFn) -> tuple[DHTable, Array]:
+    """A table and a batch of one to five configurations."""
+    table = draw(tables())
+    n, count = len(table.joints), draw(st.integers(1, 5))
+    values = draw(st.lists(st.floats(-7.0, 7.0, allow_nan=False), min_size=n * count, max_size=n * count))
+    return table, np.array(values).reshape(count, n)

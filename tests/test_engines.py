@@ -1,0 +1,244 @@
+"""Every URDF engine against exact one- and two-joint cases, and every trait it is said to have.
+
+A trait that no longer shows means the engine was mended or has changed: the record must follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness import se3
+from harness.description.model import RobotModel
+from harness.description.urdf import Urdf
+from harness.description.urdf_file import parse_urdf
+from harness.description.urdf_lint import lint
+from harness.engines.base import Engine, Trait
+from harness.engines.registry import REFERENCE, adapter_of, load_engine, registered
+from harness.errors import EngineFailed, EngineUnavailable, InputError
+from harness.se3 import Array
+from tests.conftest import engines
+from tests.helpers import assert_placements_close
+
+URDF_ENGINES = ("urdf:pinocchio", "urdf:pytorch-kinematics", "urdf:yourdfpy")
+FLOAT32 = 2e-7
+
+
+def urdf(*joints: str) -> Urdf:
+    names = ["root", *(f"l{i + 1}" for i in range(len(joints)))]
+    links = "".join(f"<link name='{name}'/>" for name in names)
+    return parse_urdf(f"<robot name='r'>{links}{''.join(joints)}</robot>".encode(), Path("case.urdf"))
+
+
+def joint(name: str, child: int, kind: str = "revolute", axis: str | None = "0 0 1", extra: str = "", parent: int | None = None) -> str:
+    """Joint `name` from link child - 1 (or `parent`) to link l<child>, 0.5 m along x."""
+    above = child - 1 if parent is None else parent
+    axis_text = "" if axis is None else f"<axis xyz='{axis}'/>"
+    return (
+        f"<joint name='{name}' type='{kind}'><origin xyz='0.5 0 0.25' rpy='0 0 0'/><parent link='{'root' if above == 0 else f'l{above}'}'/>"
+        f"<child link='l{child}'/>{axis_text}{extra}<limit lower='-9' upper='9' effort='1' velocity='1'/></joint>"
+    )
+
+
+def build(source: str, description: Urdf) -> Engine:
+    return adapter_of(source)(description)
+
+
+def placement(engine: Engine, link: str, **q: float) -> Array:
+    values = np.array([[q.get(name, 0.0) for name in engine.joints]])
+    return engine.placements(values, [link])[0, 0]
+
+
+STEP = se3.translation((0.5, 0.0, 0.25))
+
+
+def turn(axis: Sequence[float], angle: float) -> Array:
+    """Rotation about any axis by Rodrigues' formula, written here independently of the harness."""
+    x, y, z = np.array(axis) / np.linalg.norm(axis)
+    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    T = np.eye(4)
+    T[:3, :3] += np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+    return T
+
+
+CASES = [
+    pytest.param(joint("j", 1), STEP @ turn((0, 0, 1), 0.7), id="revolute z"),
+    pytest.param(joint("j", 1, axis="-1 0 0"), STEP @ turn((-1, 0, 0), 0.7), id="revolute -x"),
+    pytest.param(joint("j", 1, axis="0 0 2"), STEP @ turn((0, 0, 1), 0.7), id="revolute, axis of length 2"),
+    pytest.param(joint("j", 1, axis="0.6 0 0.8"), STEP @ turn((0.6, 0, 0.8), 0.7), id="oblique"),
+    pytest.param(joint("j", 1, axis="0 1e-16 1"), STEP @ turn((0, 1e-16, 1), 0.7), id="barely oblique"),
+    pytest.param(joint("j", 1, axis="1 1 0"), STEP @ turn((1, 1, 0), 0.7), id="oblique, axis of length sqrt 2"),
+    pytest.param(joint("j", 1, "continuous"), STEP @ turn((0, 0, 1), 0.7), id="continuous"),
+    pytest.param(joint("j", 1, "prismatic", "0 1 0"), STEP @ se3.translation((0, 0.7, 0)), id="prismatic"),
+    pytest.param(joint("j", 1, "prismatic", "0.6 0 0.8"), STEP @ se3.translation((0.42, 0, 0.56)), id="prismatic, oblique"),
+    pytest.param(joint("j", 1, axis=None), STEP @ turn((1, 0, 0), 0.7), id="no axis"),
+    pytest.param(joint("j", 1, "prismatic", "0 0 2"), STEP @ se3.translation((0, 0, 0.7)), id="prismatic, axis of length 2"),
+]
+WRONG = {
+    ("urdf:pytorch-kinematics", "no axis"): ("missing-axis-z", STEP @ turn((0, 0, 1), 0.7)),
+    ("urdf:yourdfpy", "prismatic, axis of length 2"): ("prismatic-scaled", STEP @ se3.translation((0, 0, 1.4))),
+}
+
+
+@pytest.mark.parametrize(("text", "expected"), CASES)
+@pytest.mark.parametrize("source", engines(*URDF_ENGINES))
+def test_one_joint(source: str, text: str, expected: Array, request: pytest.FixtureRequest) -> None:
+    """The specification's answer; where a trait says otherwise, the trait's answer, and a lint that warns of it."""
+    description = urdf(text)
+    case = request.node.callspec.id.removeprefix(f"{source}-")
+    if known := WRONG.get((source, case)):
+        key, expected = known
+        trait = next(t for t in adapter_of(source).traits if t.key == key)
+        assert trait.lint in [f.code for f in lint(description)]
+    engine = build(source, description)
+    assert engine.joints == ("j",)
+    assert_placements_close(placement(engine, "l1", j=0.7), expected, FLOAT32 if "pytorch" in source else 1e-15)
+
+
+@pytest.mark.parametrize("source", engines(*URDF_ENGINES))
+def test_mimic(source: str) -> None:
+    """Given what the harness passes, every engine places the follower where the specification says."""
+    description = urdf(joint("lead", 1), joint("follow", 2, "continuous", extra="<mimic joint='lead' multiplier='-2' offset='0.25'/>"))
+    engine = build(source, description)
+    assert ("follow" in engine.joints) is not adapter_of(source).applies_mimic
+    T = placement(engine, "l2", lead=0.4, follow=-2 * 0.4 + 0.25)
+    expected = STEP @ turn((0, 0, 1), 0.4) @ STEP @ turn((0, 0, 1), -0.55)
+    assert_placements_close(T, expected, FLOAT32 if "pytorch" in source else 1e-15)
+    keys = {t.key for t in adapter_of(source).traits}
+    assert ("mimic-applied" if adapter_of(source).applies_mimic else "mimic-independent") in keys
+
+
+@pytest.mark.parametrize("source", engines(*URDF_ENGINES))
+@pytest.mark.parametrize("kind", ["floating", "planar"])
+def test_floating_and_planar_joints_are_refused_or_left_alone(source: str, kind: str) -> None:
+    """Off the chain such a joint may stand; an engine that cannot live with it says so as EngineFailed."""
+    description = urdf(joint("j", 1), joint("off", 2, kind, parent=0))
+    try:
+        T = placement(build(source, description), "l1", j=0.7)
+    except (EngineFailed, NotImplementedError, ValueError, KeyError, IndexError):
+        assert "no-floating-planar" in {t.key for t in adapter_of(source).traits}
+    else:
+        assert_placements_close(T, STEP @ turn((0, 0, 1), 0.7), FLOAT32 if "pytorch" in source else 1e-15)
+
+
+ORDERS = {
+    "urdf:pinocchio": ("ja1", "ja2", "jz1", "jz2"),
+    "urdf:pytorch-kinematics": ("jz1", "jz2", "ja1", "ja2"),
+    "urdf:yourdfpy": ("jz1", "ja1", "jz2", "ja2"),
+}
+
+
+@pytest.mark.parametrize("source", engines(*URDF_ENGINES))
+def test_two_branches_are_told_apart_by_name(source: str) -> None:
+    """Each engine has an order of its own, and answers by name all the same."""
+    text = [joint("jz1", 1), joint("ja1", 2, parent=0), joint("jz2", 3, parent=1), joint("ja2", 4, parent=2)]
+    engine = build(source, urdf(*text))
+    assert engine.joints == ORDERS[source]
+    for link, first, second in (("l3", "jz1", "jz2"), ("l4", "ja1", "ja2")):
+        T = placement(engine, link, **{first: 0.3, second: -0.8})
+        assert_placements_close(T, STEP @ turn((0, 0, 1), 0.3) @ STEP @ turn((0, 0, 1), -0.8), FLOAT32 if "pytorch" in source else 1e-15)
+
+
+@pytest.mark.parametrize("source", engines("urdf:pytorch-kinematics"))
+def test_float32_origins(source: str) -> None:
+    """0.1 is not a float32: the trait shows even though the chain is float64."""
+    text = joint("j", 1).replace("0.5 0 0.25", "0.1 0 0")
+    T = placement(build(source, urdf(text)), "l1")
+    assert T[0, 3] == np.float64(np.float32(0.1)) != 0.1
+
+
+@pytest.mark.parametrize("source", engines(REFERENCE, "dh:pinocchio", *URDF_ENGINES))
+def test_batches_equal_single_configurations(models: dict[str, RobotModel], source: str) -> None:
+    """No state is carried from one configuration to the next, in any order."""
+    model = models["panda"]
+    engine = load_engine(source, model)
+    frames = engine.frames[-3:]
+    q = model.joint_map(source.partition(":")[0]).values(model.configurations.random(1, 0, 6), engine.joints)
+    batch = engine.placements(q, frames)
+    assert_placements_close(engine.placements(q[::-1], frames)[::-1], batch, 1e-15)
+    assert_placements_close(np.concatenate([engine.placements(q_k[None], frames) for q_k in q]), batch, 1e-15)
+
+
+@pytest.mark.parametrize("source", engines(REFERENCE, "dh:pinocchio", *URDF_ENGINES))
+def test_wrong_calls(models: dict[str, RobotModel], source: str) -> None:
+    engine = load_engine(source, models["ur3"])
+    with pytest.raises(ValueError, match=r"expected q of shape \(N, 6\), got \(2, 5\)"):
+        engine.placements(np.zeros((2, 5)), engine.frames[:1])
+    with pytest.raises(KeyError, match="has no frame 'nowhere'"):
+        engine.placements(np.zeros((1, 6)), ["nowhere"])
+
+
+@pytest.mark.parametrize("source", engines(*URDF_ENGINES))
+def test_a_urdf_the_library_refuses(source: str) -> None:
+    """Two parents: no engine is asked in a run, but each adapter turns its library's complaint into EngineFailed or an answer."""
+    broken = urdf(joint("j", 1), joint("k", 1, parent=0))
+    try:
+        build(source, broken)
+    except EngineFailed as error:
+        assert error.source == source
+        assert "refused the URDF" in error.reason
+
+
+def test_the_registry() -> None:
+    assert list(registered())[0] == REFERENCE
+    assert {"dh:numpy", "dh:pinocchio", *URDF_ENGINES} <= set(registered())
+    with pytest.raises(InputError, match=r"no source 'urdf:pinochio'; did you mean 'urdf:pinocchio'"):
+        adapter_of("urdf:pinochio")
+    for entry in registered().values():
+        assert entry.adapter is not None, entry.problem
+        assert all(isinstance(t, Trait) and t.text and t.evidence for t in entry.adapter.traits)
+
+
+class _Missing(Engine):
+    source = "dh:missing"
+    requirements = ("no-such-distribution>=1", "numpy>=1")
+
+    def __init__(self, description: object) -> None:
+        self.library("no_such_module")
+
+    def _placements(self, q: Array, frames: Sequence[str]) -> Array:
+        raise AssertionError
+
+
+class _TooOld(_Missing):
+    source = "dh:too-old"
+    requirements = ("numpy>=99",)
+
+
+class _Broken(_Missing):
+    source = "dh:broken"
+    requirements = ("numpy>=1",)
+
+
+@pytest.mark.parametrize(
+    ("adapter", "message"),
+    [
+        (_Missing, 'no-such-distribution is not installed; pip install "no-such-distribution>=1" "numpy>=1"'),
+        (_TooOld, "needs numpy>=99, found numpy"),
+        (_Broken, "import no_such_module failed"),
+    ],
+)
+def test_unavailable(adapter: type[Engine], message: str) -> None:
+    with pytest.raises(EngineUnavailable) as caught:
+        adapter(None)
+    assert message in str(caught.value)
+    assert caught.value.exit_code == 3
+
+
+class _WrongShape(Engine):
+    source = "dh:wrong-shape"
+
+    def __init__(self, result: Array) -> None:
+        self.joints, self.frames, self._result = ("j",), ("f",), result
+
+    def _placements(self, q: Array, frames: Sequence[str]) -> Array:
+        return self._result
+
+
+@pytest.mark.parametrize("result", [np.zeros((1, 4, 4)), np.zeros((2, 1, 4, 4), dtype=np.float32), np.zeros((1, 1, 4, 4))])
+def test_a_result_of_the_wrong_shape_or_type(result: Array) -> None:
+    with pytest.raises(EngineFailed, match=r"expected placements float64 \(2, 1, 4, 4\)"):
+        _WrongShape(result).placements(np.zeros((2, 1)), ["f"])
