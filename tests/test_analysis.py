@@ -44,7 +44,13 @@ def test_rotations_have_no_residual(T: Array) -> None:
 
 @pytest.mark.parametrize(
     "R",
-    [np.diag([1.0, 1.0, -1.0]), np.diag([-1.0, -1.0, -1.0]), 1.001 * np.eye(3), np.eye(3) + 0.01 * np.eye(3, k=1), np.zeros((3, 3))],
+    [
+        np.diag([1.0, 1.0, -1.0]),
+        np.diag([-1.0, -1.0, -1.0]),
+        1.001 * np.eye(3),
+        np.eye(3) + 0.01 * np.eye(3, k=1),
+        np.zeros((3, 3)),
+    ],
     ids=["reflection", "inversion", "scale", "shear", "zero"],
 )
 def test_what_is_no_rotation_has_a_residual(R: Array) -> None:

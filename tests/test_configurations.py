@@ -28,7 +28,10 @@ def test_any_configuration_is_regenerated_from_seed_and_index(seed: int, start: 
 
 def test_the_stream_is_pinned() -> None:
     """These numbers are part of every report's reproducibility: they must never change."""
-    expected = [[-0.9769064914273369, 0.12077459828135906, 5.111425855514939], [0.12882924321426747, 0.2511898021367527, 5.277605576884554]]
+    expected = [
+        [-0.9769064914273369, 0.12077459828135906, 5.111425855514939],
+        [0.12882924321426747, 0.2511898021367527, 5.277605576884554],
+    ]
     got = UNIT.random(0, 0, 2)
     assert got.shape == (2, 3)
     assert got == pytest.approx(np.array(expected), abs=1e-15)

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-from harness import sources as sources_module
 from harness.crosscheck import crosscheck
 from harness.description.model import RobotModel, load_model
 from harness.engines import registry
 from harness.engines.base import Engine
 from harness.engines.dh_numpy import DHNumpy
 from harness.engines.registry import Registered
+from harness.engines.urdf_pinocchio import UrdfPinocchio
 from harness.errors import InputError
 from harness.report.document import Report, Source
 from harness.report.json_file import to_json
@@ -58,7 +58,7 @@ def test_ur5_to_the_noise_floor_of_each_source(models: dict[str, RobotModel]) ->
         assert source(report, name).noise == noise.get(name, "pi-12-digits")
 
 
-SWAP = [
+SWAP: list[Edit] = [
     ("dh.csv", "wrist_1_joint", "SWAPPED"),
     ("dh.csv", "wrist_2_joint", "wrist_1_joint"),
     ("dh.csv", "SWAPPED", "wrist_2_joint"),
@@ -73,38 +73,61 @@ EE_LINK_FOR_TOOL0: list[Edit] = [
     ("frames.toml", 'urdf = "ee_link"', 'urdf = "tool0"'),
     ("frames.toml", 'urdf = "X"', 'urdf = "ee_link"'),
 ]
-# (robot, edits, first frame that disagrees, a frame that must be caught, its largest position error or None)
-FAULTS = [
-    pytest.param("ur5", [("dh.csv", "0.089159", "0.089460")], "upper_arm_link", "tool0", 0.301e-3, id="d1 + 0.301 mm"),
-    pytest.param("ur5", [("dh.csv", "revolute,0,pi/2,0.089159", "revolute,0,-pi/2,0.089159")], "upper_arm_link", "tool0", None, id="alpha1 sign"),
-    pytest.param("ur5", BASE_LINK_FOR_BASE, "base_link", "tool0", None, id="base is base_link"),
-    pytest.param("ur5", EE_LINK_FOR_TOOL0, "tool0", "tool0", 0.0, id="tool0 is ee_link"),
-    pytest.param("ur5", [("frames.toml", "[[frame]]\nname = \"base\"", "[joints.elbow_joint]\nsign = -1\n[[frame]]\nname = \"base\"")], "forearm_link", "tool0", None, id="one joint's sign"),
-    pytest.param("ur5", [("dh.csv", "pi/2", "90")], "upper_arm_link", "tool0", None, id="degrees"),
-    pytest.param("ur5", [("model.toml", '"standard"', '"modified"')], "shoulder_link", "tool0", None, id="standard read as modified"),
-    pytest.param("panda", [("model.toml", '"modified"', '"standard"')], None, "panda_link8", None, id="modified read as standard"),
-    pytest.param("sixr", [("model.toml", "xyz = [0.18, 0, 0.1]", "xyz = [0.18, 0, -0.05]")], "tool", "tool", 0.15, id="a 150 mm tool left out"),
-    pytest.param("ur5", SWAP, "wrist_1_link", "tool0", None, id="two joints swapped"),
-    pytest.param("ur5", [("frames.toml", "[[frame]]\nname = \"base\"", "[joints.elbow_joint.coupling]\nshoulder_lift_joint = 1\n[[frame]]\nname = \"base\"")], "forearm_link", "tool0", None, id="nothing to see at q = 0"),
-    pytest.param("stanford", [("stanford.urdf", '<axis xyz="0 1 0"/>\n    <limit lower="0"', '<axis xyz="0 -1 0"/>\n    <limit lower="0"')], "link3", "tip", 3.0, id="prismatic axis flipped"),
-    pytest.param("humanoid_arm", [("dh.csv", "gripper,fixed,0,0,0.06,0", "gripper,fixed,0,0,0,0")], "gripper_link", "gripper_link", 0.06, id="a fixed row's d"),
-]  # fmt: skip
+FIRST_ENTRY = '[[frame]]\nname = "base"\n'
 
 
-@pytest.mark.parametrize(("robot", "edits", "first", "frame", "size"), FAULTS)
-def test_faults_are_caught_and_located(
-    copy_model: Callable[..., Path], robot: str, edits: Sequence[Edit], first: str | None, frame: str, size: float | None
-) -> None:
-    report = check(copy_model(robot, *edits))
+def joint_entry(toml: str) -> Edit:
+    """Put a `[joints]` table in front of frames.toml."""
+    return ("frames.toml", FIRST_ENTRY, toml + FIRST_ENTRY)
+
+
+COUPLED = joint_entry("[joints.elbow_joint.coupling]\nshoulder_lift_joint = 1\n")
+LIMIT = '\n    <limit lower="0"'
+
+
+class Fault(NamedTuple):
+    """A fault made in a model: where it first shows, a frame that must be caught, and its largest position error there."""
+
+    robot: str
+    edits: list[Edit]
+    first: str
+    frame: str
+    size: float | None = None
+
+
+FAULTS = {
+    "d1 + 0.301 mm": Fault("ur5", [("dh.csv", "0.089159", "0.089460")], "upper_arm_link", "tool0", 0.301e-3),
+    "alpha1 sign": Fault("ur5", [("dh.csv", "revolute,0,pi/2,0.089", "revolute,0,-pi/2,0.089")], "upper_arm_link", "tool0"),
+    "base is base_link": Fault("ur5", BASE_LINK_FOR_BASE, "base_link", "tool0"),
+    "tool0 is ee_link": Fault("ur5", EE_LINK_FOR_TOOL0, "tool0", "tool0", 0.0),
+    "one joint's sign": Fault("ur5", [joint_entry("[joints.elbow_joint]\nsign = -1\n")], "forearm_link", "tool0"),
+    "degrees": Fault("ur5", [("dh.csv", "pi/2", "90")], "upper_arm_link", "tool0"),
+    "standard read as modified": Fault("ur5", [("model.toml", '"standard"', '"modified"')], "shoulder_link", "tool0"),
+    "modified read as standard": Fault("panda", [("model.toml", '"modified"', '"standard"')], "panda_link2", "panda_link8"),
+    "a 150 mm tool left out": Fault(
+        "sixr", [("model.toml", "xyz = [0.18, 0, 0.1]", "xyz = [0.18, 0, -0.05]")], "tool", "tool", 0.15
+    ),
+    "two joints swapped": Fault("ur5", SWAP, "wrist_1_link", "tool0"),
+    "nothing to see at q = 0": Fault("ur5", [COUPLED], "forearm_link", "tool0"),
+    "prismatic axis flipped": Fault(
+        "stanford", [("stanford.urdf", f'"0 1 0"/>{LIMIT}', f'"0 -1 0"/>{LIMIT}')], "link3", "tip", 3.0
+    ),
+    "a fixed row's d": Fault("humanoid_arm", [("dh.csv", "fixed,0,0,0.06", "fixed,0,0,0")], "gripper_link", "gripper_link", 0.06),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_faults_are_caught_and_located(copy_model: Callable[..., Path], name: str) -> None:
+    fault = FAULTS[name]
+    report = check(copy_model(fault.robot, *fault.edits))
     found = source(report, "urdf:pinocchio")
     assert report.verdict.exit_code == 1
     assert found.verdict == "disagrees"
-    if first is not None:
-        assert found.first_disagreeing_frame == first
-    result = next(f for f in found.frames if f.frame == frame)
+    assert found.first_disagreeing_frame == fault.first
+    result = next(f for f in found.frames if f.frame == fault.frame)
     assert result.verdict == "disagrees"
-    if size is not None:
-        assert result.position.max == pytest.approx(size, rel=1e-3, abs=1e-9)
+    if fault.size is not None:
+        assert result.position.max == pytest.approx(fault.size, rel=1e-3, abs=1e-9)
     # The reproducer really shows it: recomputed here from its q alone.
     r = found.reproducer
     assert r is not None
@@ -120,8 +143,7 @@ def test_faults_are_caught_and_located(
 
 def test_what_q_zero_does_not_show(copy_model: Callable[..., Path]) -> None:
     """The same fault with nothing but q = 0 looked at would pass: the other configurations catch it."""
-    edits = next(p for p in FAULTS if p.id == "nothing to see at q = 0").values[1]
-    found = source(check(copy_model("ur5", *edits)), "urdf:pinocchio")  # type: ignore[arg-type]
+    found = source(check(copy_model("ur5", COUPLED)), "urdf:pinocchio")
     assert found.reproducer is not None
     moved = [name for name, value in zip(found.joints, found.reproducer.q, strict=True) if value]
     assert moved == ["shoulder_lift_joint"]  # shrunk to the one joint that matters
@@ -358,9 +380,9 @@ def test_when_every_optional_source_is_missing_nothing_passes(
     assert "no source was compared" in report.verdict.sentence
 
 
-def test_an_engine_that_lacks_a_mapped_link_does_not_agree(models: dict[str, RobotModel], monkeypatch: pytest.MonkeyPatch) -> None:
-    from harness.engines.urdf_pinocchio import UrdfPinocchio
-
+def test_an_engine_that_lacks_a_mapped_link_does_not_agree(
+    models: dict[str, RobotModel], monkeypatch: pytest.MonkeyPatch
+) -> None:
     class DropsTool(UrdfPinocchio):
         def __init__(self, description: object) -> None:
             super().__init__(description)  # type: ignore[arg-type]
@@ -403,4 +425,3 @@ def test_tolerances_add_up_against_another_reference(models: dict[str, RobotMode
     assert source(report, "dh:numpy").tolerance.position == 1e-10
     assert source(report, "dh:pinocchio").tolerance.position == pytest.approx(1e-10 + 1e-13)
     assert source(report, "urdf:yourdfpy").tolerance.position == pytest.approx(2e-10)
-    assert dataclasses.is_dataclass(sources_module.Planned)

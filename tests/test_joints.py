@@ -22,7 +22,9 @@ def test_sign_offset_coupling(copy_model: Callable[..., Path]) -> None:
     with (folder / "frames.toml").open("a") as file:
         file.write('[joints.elbow_flex]\nsign = -1\noffset = "pi/2"\ncoupling = {shoulder_lift = 0.5}\n')
     values = mapped_values(load_model(folder), [0.1, 0.2, 0.3, 0.4])
-    assert values == pytest.approx({"shoulder_pan": 0.1, "shoulder_lift": 0.2, "elbow_flex": -0.3 + 0.1 + np.pi / 2, "wrist_flex": 0.4})
+    assert values == pytest.approx(
+        {"shoulder_pan": 0.1, "shoulder_lift": 0.2, "elbow_flex": -0.3 + 0.1 + np.pi / 2, "wrist_flex": 0.4}
+    )
 
 
 def test_names_that_differ(copy_model: Callable[..., Path]) -> None:
@@ -36,7 +38,8 @@ def test_followers_get_multiplier_times_leader_plus_offset(copy_model: Callable[
     """The wrist follows the elbow, and a joint off the chain follows the wrist."""
     mimic = '<mimic joint="elbow_flex" multiplier="-2" offset="0.1"/><axis xyz="0 0 1"/>'
     finger = """<link name="finger"/><joint name="a_finger" type="prismatic"><parent link="gripper_link"/><child link="finger"/>
-    <axis xyz="1 0 0"/><mimic joint="wrist_flex" multiplier="3"/><limit lower="0" upper="1" effort="1" velocity="1"/></joint></robot>"""
+    <axis xyz="1 0 0"/><mimic joint="wrist_flex" multiplier="3"/>
+    <limit lower="0" upper="1" effort="1" velocity="1"/></joint></robot>"""
     folder = copy_model("humanoid_arm", ("humanoid_arm.urdf", "</robot>", finger))
     urdf = folder.parent.parent / "urdf" / "humanoid_arm.urdf"
     head, tail = urdf.read_text().split('<joint name="wrist_flex"')

@@ -39,10 +39,19 @@ def test_published_values_are_on_file(models: dict[str, RobotModel]) -> None:
 
 
 UR5_ERRORS: list[tuple[Edit, str]] = [
-    (("model.toml", "convention", "convension"), r"model.toml: convension: unknown key; did you mean 'convention'\? \(and 1 more"),
+    (
+        ("model.toml", "convention", "convension"),
+        r"model.toml: convension: unknown key; did you mean 'convention'\? \(and 1 more",
+    ),
     (("model.toml", '"standard"', '"standart"'), "model.toml: convention: input should be 'standard' or 'modified'"),
-    (("model.toml", "[tolerance]\nposition = 1e-10", "[tolerance]\nposition = nan"), "tolerance.position: expected a finite number"),
-    (("model.toml", "[tolerance]\nposition = 1e-10", "[tolerance]\nposition = -1"), "tolerance.position: input should be greater"),
+    (
+        ("model.toml", "[tolerance]\nposition = 1e-10", "[tolerance]\nposition = nan"),
+        "tolerance.position: expected a finite number",
+    ),
+    (
+        ("model.toml", "[tolerance]\nposition = 1e-10", "[tolerance]\nposition = -1"),
+        "tolerance.position: input should be greater",
+    ),
     (("model.toml", "[tolerance]\nposition = 1e-10", '[tolerance]\nposition = "1 mm"'), "tolerance.position: expected a number"),
     (("model.toml", "[tolerance]\nposition = 1e-10", "[tolerance]\nposition = true"), "tolerance.position: expected a number"),
     (("model.toml", 'name = "ur5"', 'name = "../ur5"'), "model.toml: name: string should match pattern"),
@@ -51,23 +60,41 @@ UR5_ERRORS: list[tuple[Edit, str]] = [
     (("model.toml", "dh:pinocchio", "urdf:pinocchio"), r"source\[1\].name: source 'urdf:pinocchio' is there twice"),
     (("model.toml", "ur5_robot.urdf", "ur5_robot.udrf"), r"urdf.file: no such file .*did you mean '.*ur5_robot.urdf'"),
     (("model.toml", "", "name = 'x'\n"), "model.toml: description: required key is missing"),
-    (("frames.toml", 'urdf = "tool0"', 'urdf = "tool_0"'), r"frame\[9\].urdf: no link 'tool_0' in ur5_robot.urdf; did you mean 'tool0'"),
+    (
+        ("frames.toml", 'urdf = "tool0"', 'urdf = "tool_0"'),
+        r"frame\[9\].urdf: no link 'tool_0' in ur5_robot.urdf; did you mean 'tool0'",
+    ),
     (("frames.toml", 'urdf = "tool0"', 'urdf = "base"'), r"frame\[9\].urdf: link 'base' is mapped twice, first by frame\[0\]"),
     (("frames.toml", 'name = "tool0"', 'name = "base"'), r"frame\[9\].name: frame name 'base' is mapped twice"),
-    (("frames.toml", 'dh = 6\nurdf = "tool0"', 'dh = 7\nurdf = "tool0"'), r"frame\[9\].dh: no DH frame '7' in dh.csv: expected base, 0 to 6, or tool"),
+    (
+        ("frames.toml", 'dh = 6\nurdf = "tool0"', 'dh = 7\nurdf = "tool0"'),
+        r"frame\[9\].dh: no DH frame '7' in dh.csv: expected base, 0 to 6, or tool",
+    ),
     (("frames.toml", 'of = "base"', 'of = "bas"'), r"frame\[1\].of: no frame 'bas' in this file; did you mean 'base'"),
     (("frames.toml", 'of = "base"', 'of = "shoulder_link"'), r"frame\[1\].of: 'shoulder_link' is rigid"),
     (("frames.toml", 'of = "base"\n', 'of = "world"\n'), "frames refer to each other in a circle"),
-    (("frames.toml", 'dh = 0\nurdf = "base"', 'dh = 0\nurdf = "base"\nxyz = [0, 0, 0]'), "expected an entry with dh = 'base' or '0'"),
+    (
+        ("frames.toml", 'dh = 0\nurdf = "base"', 'dh = 0\nurdf = "base"\nxyz = [0, 0, 0]'),
+        "expected an entry with dh = 'base' or '0'",
+    ),
     (("frames.toml", "rigid = true", "ridgid = true"), r"frame\[3\].ridgid: unknown key; did you mean 'rigid'\?"),
     (("frames.toml", "rigid = true", "rigid = true\nxyz = [0, 0, 1]"), "'rigid' means the offset is measured"),
     (("frames.toml", "dh = 1\n", ""), "expected exactly one of 'dh' and 'of'"),
     (("frames.toml", 'rpy = [0, 0, "pi"]', 'rpy = [0, "pi"]'), r"frame\[1\].rpy: list should have at least 3 items"),
-    (("dh.csv", "elbow_joint", "elbow"), r"joints.elbow: joint 'elbow' of dh.csv is not in ur5_robot.urdf; did you mean 'elbow_joint'"),
+    (
+        ("dh.csv", "elbow_joint", "elbow"),
+        r"joints.elbow: joint 'elbow' of dh.csv is not in ur5_robot.urdf; did you mean 'elbow_joint'",
+    ),
     (("dh.csv", "elbow_joint,revolute,-0.39225,0,0,0\n", ""), "no DH frame '6' in dh.csv: expected base, 0 to 5"),
-    (("dh.csv", "elbow_joint,revolute", "elbow_joint,prismatic"), "'elbow_joint' is prismatic in dh.csv, .* is revolute in the URDF"),
+    (
+        ("dh.csv", "elbow_joint,revolute", "elbow_joint,prismatic"),
+        "'elbow_joint' is prismatic in dh.csv, .* is revolute in the URDF",
+    ),
     (("dh.csv", "elbow_joint,revolute", "elbow_joint,fixed"), "URDF joint 'elbow_joint' moves a mapped link, but no model joint"),
-    (("configurations.toml", "[30, -60, 90,", "[30, -60,"), r"configuration\[0\].q: expected 6 values \(shoulder_pan_joint.*got 5"),
+    (
+        ("configurations.toml", "[30, -60, 90,", "[30, -60,"),
+        r"configuration\[0\].q: expected 6 values \(shoulder_pan_joint.*got 5",
+    ),
     (("configurations.toml", 'name = "article"', 'name = "upright"'), "configuration 'upright' is there twice"),
     (("configurations.toml", 'unit = "deg"', 'unit = "degree"'), r"configuration\[0\].unit: input should be 'rad' or 'deg'"),
     (("configurations.toml", 'status = "holds"', 'status = "hold"'), "status: input should be 'holds' or 'wrong', got 'hold'"),
@@ -89,7 +116,10 @@ def test_one_clear_error(copy_model: Callable[..., Path], edit: Edit, message: s
 @pytest.mark.parametrize(
     ("joints", "message"),
     [
-        ('[joints]\nelbo_joint = "elbow_joint"', r"joints.elbo_joint: no joint 'elbo_joint' in dh.csv; did you mean 'elbow_joint'"),
+        (
+            '[joints]\nelbo_joint = "elbow_joint"',
+            r"joints.elbo_joint: no joint 'elbo_joint' in dh.csv; did you mean 'elbow_joint'",
+        ),
         ('[joints]\nelbow_joint = "wrist_1_joint"', "URDF joint 'wrist_1_joint' is mapped twice"),
         ('[joints]\nelbow_joint = "world_joint"', "URDF joint 'world_joint' is fixed, it takes no value"),
         ("[joints.elbow_joint]\nsign = 2", "sign: input should be -1 or 1"),
@@ -159,7 +189,7 @@ def test_where_models_are_found(tmp_path: Path) -> None:
 def test_where_urdfs_are_found() -> None:
     folder = default_models_dir() / "ur5"
     assert locate_urdf("ur5e.urdf", None, folder).name == "ur5e.urdf"
-    with pytest.raises(ModelFileError, match="no URDF 'ur5x.urdf' under urdf/; did you mean 'ur5e.urdf'"):
+    with pytest.raises(ModelFileError, match=r"no URDF 'ur5x\.urdf' under urdf/; did you mean 'ur5e.urdf'"):
         locate_urdf("ur5x.urdf", None, folder)
     with pytest.raises(DescriptionUnavailable, match="no-such-robots is not installed; pip install no-such-robots") as caught:
         locate_urdf("x.urdf", "no-such-robots", folder)
@@ -172,7 +202,9 @@ def test_dh_only_model(copy_model: Callable[..., Path]) -> None:
     """A table without a URDF is still compared among DH sources."""
     folder = copy_model("sixr")
     text = (folder / "model.toml").read_text().split("[urdf]")[0]
-    (folder / "model.toml").write_text(text + '[tolerance]\nposition = 1e-12\nrotation = 1e-12\n[[source]]\nname = "dh:pinocchio"\n')
+    (folder / "model.toml").write_text(
+        text + '[tolerance]\nposition = 1e-12\nrotation = 1e-12\n[[source]]\nname = "dh:pinocchio"\n'
+    )
     (folder / "frames.toml").write_text('[[frame]]\nname = "base"\ndh = 0\n[[frame]]\nname = "tip"\ndh = "tool"\n')
     model = load_model(folder)
     assert (model.urdf, model.urdf_joints) == (None, None)

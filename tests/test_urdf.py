@@ -6,6 +6,7 @@ from importlib import metadata
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from harness.description.urdf import Urdf
@@ -118,7 +119,7 @@ def test_lint_finds(body: str, code: str, level: str) -> None:
     urdf = parse_urdf(robot(body), HERE)
     assert (code, level) in [(f.code, f.level) for f in lint(urdf)]
     if level == "error":
-        with pytest.raises(UrdfError, match="arm.urdf"):
+        with pytest.raises(UrdfError, match=r"arm\.urdf"):
             check(urdf)
     else:
         assert code in [f.code for f in check(urdf)]
@@ -126,7 +127,10 @@ def test_lint_finds(body: str, code: str, level: str) -> None:
 
 def test_a_clean_file_has_no_findings() -> None:
     exact = "<origin xyz='0 0.785 1.57' rpy='0 1.5707963267948966 -3.141592653589793'/>"
-    assert codes(links("a", "b", "c") + joint("j", "a", "b", exact, axis="-1 0 0") + joint("k", "b", "c", kind="fixed", axis="")) == []
+    assert (
+        codes(links("a", "b", "c") + joint("j", "a", "b", exact, axis="-1 0 0") + joint("k", "b", "c", kind="fixed", axis=""))
+        == []
+    )
 
 
 def test_text_for_engines_keeps_what_has_meaning_and_nothing_else() -> None:
@@ -138,13 +142,14 @@ def test_text_for_engines_keeps_what_has_meaning_and_nothing_else() -> None:
     <mimic joint='j' multiplier='-0.5' offset='.1'/><limit effort='1' velocity='1' lower='0' upper='1'/></joint>
     <gazebo/><transmission name='t'/>"""
     text = parse_urdf(robot(body), HERE).text
-    for kept in ("xyz=\" 1  2 3\"", "1.5708", 'xyz="0 0 2"', 'multiplier="-0.5"', 'offset=".1"', 'upper="1"'):
+    for kept in ('xyz=" 1  2 3"', "1.5708", 'xyz="0 0 2"', 'multiplier="-0.5"', 'offset=".1"', 'upper="1"'):
         assert kept in text
     for gone in ("mesh", "package://", "inertial", "dynamics", "gazebo", "transmission", "material", "safety"):
         assert gone not in text
     assert text.count("<axis") == 1
     again = parse_urdf(text.encode(), HERE)
-    assert (again.text, again.joints.keys()) == (text, {"j", "k"})
+    assert again.text == text
+    assert list(again.joints) == ["j", "k"]
 
 
 def packaged_urdfs() -> list[Path]:
@@ -154,8 +159,6 @@ def packaged_urdfs() -> list[Path]:
 
 def test_stripping_changes_no_placement_of_any_packaged_robot() -> None:
     """Every URDF of example-robot-data, whole against stripped, through Pinocchio: the same placements to the last bit."""
-    import pinocchio as pin
-
     paths, compared = packaged_urdfs(), 0
     assert len(paths) > 50
     for path in paths:

@@ -28,7 +28,8 @@ def test_numbers(text: object, value: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["pi*2", "2pi", "pi/0", "pi/2.5", "sin(1)", "1+1", "", "nan", "inf", "-inf", "0x10", True, None, [1], "__import__('os')"]
+    "text",
+    ["pi*2", "2pi", "pi/0", "pi/2.5", "sin(1)", "1+1", "", "nan", "inf", "-inf", "0x10", True, None, [1], "__import__('os')"],
 )
 def test_what_is_not_a_number(text: object) -> None:
     with pytest.raises(ValueError, match="expected a"):
@@ -57,7 +58,9 @@ def test_pi_cut_short(text: str, exact: str) -> None:
     assert found.error == pytest.approx(abs(float(text) - parse_number(exact)))
 
 
-@pytest.mark.parametrize("text", ["1.5707963267948966", "3.141592653589793", "0.0", "0", "1.5", "0.79", "1.2", "0.333", "-0.425", "1e-3"])
+@pytest.mark.parametrize(
+    "text", ["1.5707963267948966", "3.141592653589793", "0.0", "0", "1.5", "0.79", "1.2", "0.333", "-0.425", "1e-3"]
+)
 def test_not_pi(text: str) -> None:
     assert find_truncation(text) is None
 

@@ -1,0 +1,80 @@
+"""Imports run one way: cli -> crosscheck -> {analysis, engines, report} -> description -> {se3, errors}."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import harness
+
+ROOT = Path(harness.__file__).parent
+
+# A module may import from its own layer (same package) and from those listed.
+BASE = {"harness", "harness.se3", "harness.errors"}
+ALLOWED = {
+    "description": {"harness.description", *BASE},
+    "analysis": {"harness.analysis", "harness.description", *BASE},
+    "engines": {"harness.engines", "harness.description", *BASE},
+    "report": {"harness.report", *BASE},
+}
+
+
+def imports(path: Path) -> set[str]:
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("harness"):
+            found.add(node.module)
+        elif isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names if alias.name.startswith("harness")}
+    return found
+
+
+@pytest.mark.parametrize("layer", sorted(ALLOWED))
+def test_arrows_run_one_way(layer: str) -> None:
+    for path in (ROOT / layer).glob("*.py"):
+        for name in imports(path):
+            package = ".".join(name.split(".")[:2])
+            assert package in ALLOWED[layer], f"{path.name} imports {name}"
+
+
+@pytest.mark.parametrize("name", ["se3.py", "errors.py"])
+def test_the_ground_floor_imports_nothing_of_ours(name: str) -> None:
+    assert imports(ROOT / name) <= {"harness.se3", "harness.errors"} - {f"harness.{name.removesuffix('.py')}"} - {
+        "harness.errors"
+    }
+
+
+def test_there_is_no_cycle() -> None:
+    graph = {
+        "harness." + ".".join(p.relative_to(ROOT).with_suffix("").parts): imports(p)
+        for p in ROOT.rglob("*.py")
+        if p.name != "__main__.py"
+    }
+    done: set[str] = set()
+
+    def visit(name: str, path: tuple[str, ...]) -> None:
+        assert name not in path, f"import cycle: {' -> '.join([*path, name])}"
+        if name not in done:
+            for other in graph.get(name, ()):
+                visit(other, (*path, name))
+            done.add(name)
+
+    for name in graph:
+        visit(name, ())
+
+
+def test_engine_modules_do_not_import_their_library() -> None:
+    """Listing the engines must work, and be quick, with none of them installed."""
+    heavy = {"pinocchio", "torch", "pytorch_kinematics", "yourdfpy"}
+    for path in ROOT.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            assert not heavy & {name.split(".")[0] for name in names}, path
+
+
+def test_modules_hold_one_idea() -> None:
+    long = {path.name: n for path in ROOT.rglob("*.py") if (n := len(path.read_text().splitlines())) > 300}
+    assert not long
