@@ -20,7 +20,6 @@ from harness.sources import Bound, Participant, bind, measure_rigid, pair_tolera
 
 BLOCK = 4096
 SUBSET = 256
-RIGID = 1024
 
 Progress = Callable[[int, int], None]
 
@@ -45,7 +44,7 @@ def crosscheck(model: RobotModel, options: Options, progress: Progress | None = 
 def _bind_all(results: Results) -> None:
     """Load every engine, measure the rigid offsets with the first URDF source that answers, then bind for good."""
     model = results.model
-    q = model.configurations.random(results.options.seed, 0, RIGID)
+    q = model.configurations.lattice()
     in_house = bind(DHNumpy(model.table), model, {})
     needs_measuring = any(frame.relation == "rigid" for frame in model.frames.frames)
     engines = {}

@@ -178,9 +178,9 @@ def bind(engine: Engine, model: RobotModel, offsets: Mapping[str, Array]) -> Bou
 def measure_rigid(model: RobotModel, in_house: Bound, urdf_source: Bound, q: Array) -> dict[str, Array]:
     """Offset of each rigid frame, by frame name: the mean of T_dh_link = T_base_dh^-1 T_base_link over q (N, n).
 
-    A mean, not one configuration: there, an offset would absorb whatever discrepancy that configuration has, and show it
-    doubled elsewhere. Rotations are averaged in the chordal sense, by projecting the mean matrix on SO(3) (Moakher 2002,
-    doi:10.1137/S0895479801383877). Frames whose placements are not finite are left out.
+    A mean over evenly spread configurations, not one of them: an offset taken at one absorbs whatever discrepancy there is
+    at that one, and shows it doubled elsewhere. Rotations are averaged in the chordal sense, by projecting the mean matrix
+    on SO(3) (Moakher 2002, doi:10.1137/S0895479801383877). Frames whose placements are not finite are left out.
     """
     T_base_dh, T_base_link = in_house.mapped(q), urdf_source.mapped(q)
     offsets = {}

@@ -13,7 +13,7 @@ from harness.description.configurations import ConfigurationSet
 from harness.description.model import RobotModel, load_model
 from harness.errors import ModelFileError
 
-UNIT = ConfigurationSet((), np.array([-1.0, 0.0, 5.0]), np.array([1.0, 0.5, 6.0]))
+UNIT = ConfigurationSet((), np.array([-1.0, 0.0, 5.0]), np.array([1.0, 0.5, 6.0]), (True, True, False))
 
 
 @given(st.integers(0, 2**64 - 1), st.integers(0, 5000), st.integers(0, 3000), st.integers(0, 3000))
@@ -89,3 +89,17 @@ def test_wrong_ranges(copy_model: Callable[..., Path], limits: str, message: str
         file.write(f"[random.limits]\n{limits}\n")
     with pytest.raises(ModelFileError, match=message):
         load_model(folder)
+
+
+@given(st.lists(st.integers(-2, 2), min_size=7, max_size=7).filter(lambda k: 0 < sum(map(abs, k)) <= 6))
+def test_the_lattice_averages_out_every_low_harmonic(k: list[int]) -> None:
+    """What rigid offsets are averaged over: no harmonic of total degree 6 or less leaves anything behind."""
+    q = ConfigurationSet((), np.zeros(7), np.ones(7), (True,) * 7).lattice()
+    assert abs(np.exp(1j * (q @ np.array(k))).mean()) < 1e-12
+
+
+def test_the_lattice_stays_within_the_range_of_prismatic_joints() -> None:
+    q = UNIT.lattice()
+    assert q.shape == (1021, 3)
+    assert (q[:, 2].min(), q[:, 2].max()) == (5.0, pytest.approx(6.0, abs=1e-3))
+    assert q[:, 0].max() > 6.2  # FK has no limits: a whole turn, whatever the limits are

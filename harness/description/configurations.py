@@ -22,6 +22,7 @@ from harness.errors import ModelFileError, nearest
 from harness.se3 import Array
 
 CHUNK = 1024
+LATTICE_POINTS, LATTICE_GENERATOR = 1021, 267
 
 
 class ConfigurationEntry(Strict):
@@ -64,6 +65,7 @@ class ConfigurationSet:
     fixed: tuple[Configuration, ...]
     lower: Array
     upper: Array
+    revolute: tuple[bool, ...]
 
     @cached_property
     def fixed_q(self) -> Array:
@@ -84,6 +86,18 @@ class ConfigurationSet:
             chunks.append((np.asarray(raw, dtype=np.uint64) >> np.uint64(11)).reshape(CHUNK, n).astype(np.float64) * 2.0**-53)
         unit = np.concatenate(chunks)[start - first * CHUNK :][:count]
         return self.lower + unit * (self.upper - self.lower)
+
+    def lattice(self) -> Array:
+        """1021 configurations spread evenly: whole turns for revolute joints, the range for prismatic ones, (1021, n).
+
+        A rank-1 lattice (Korobov 1959): the mean over it is the mean over all configurations, exactly, for every
+        trigonometric polynomial of total degree up to 6 in up to 7 joints. The generator was found by trying all.
+        """
+        steps = np.array([pow(LATTICE_GENERATOR, j, LATTICE_POINTS) for j in range(len(self.lower))])
+        unit = (np.arange(LATTICE_POINTS)[:, None] * steps % LATTICE_POINTS) / LATTICE_POINTS
+        turns = np.array(self.revolute)
+        q: Array = np.where(turns, 2 * math.pi * unit, self.lower + unit * (self.upper - self.lower))
+        return q
 
     def block(self, seed: int, start: int, stop: int) -> Array:
         """Configurations by index, fixed then random, (stop - start, n)."""
@@ -133,7 +147,7 @@ def resolve_configurations(
             fixed.append(configuration)
     fixed += _one_joint_at_a_time(table, ranges)
     lower, upper = np.array([ranges[j] for j in table.joints]).reshape(-1, 2).T
-    return ConfigurationSet(tuple(fixed), lower, upper)
+    return ConfigurationSet(tuple(fixed), lower, upper, tuple(table.kind(j) == "revolute" for j in table.joints))
 
 
 def _radians(entry: ConfigurationEntry, table: DHTable) -> Array:

@@ -127,7 +127,7 @@ class Source(Part):
 
 
 class Frame(Part):
-    """One mapped frame. `offset` is T_dh_frame: declared, or if rigid the mean over 1024 random configurations."""
+    """One mapped frame. `offset` is T_dh_frame: declared, or if rigid the mean over all configurations (a lattice of 1021)."""
 
     name: str
     dh: str

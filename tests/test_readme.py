@@ -1,0 +1,65 @@
+"""What the README says is run: its commands are those of CI, its example prints what it shows."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from harness.cli import cli
+from harness.engines.registry import registered
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text()
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+
+
+def test_ci_runs_the_two_commands() -> None:
+    main, tests = (block.strip() for block in blocks("sh")[:2])
+    assert main.endswith("nox -s crosscheck")
+    assert tests.endswith("nox -s tests")
+    lines = (ROOT / ".ci" / "run").read_text().splitlines()
+    assert main in lines
+    assert tests in lines
+
+
+def test_the_example_prints_what_it_shows(tmp_path: Path) -> None:
+    (block,) = blocks("console")
+    shutil.copytree(ROOT / "models" / "ur3", tmp_path / "models" / "ur3")
+    commands = [line[2:] for line in block.splitlines() if line.startswith("$ ")]
+    shown = [line.rstrip() for line in block.splitlines() if not line.startswith("$ ")]
+    assert len(shown) <= 10
+    script = "\n".join(commands).replace("crosscheck run", f'"{sys.executable}" -m harness run')
+    env = {k: v for k, v in os.environ.items() if k != "FORCE_COLOR"}
+    result = subprocess.run(
+        ["bash", "-c", script], cwd=tmp_path, env=env, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert result.returncode == 1
+    assert [line.rstrip() for line in result.stdout.splitlines()] == shown
+
+
+@pytest.mark.parametrize("command", ["run", "frames", "engines", "render", "completion"])
+def test_every_command_is_shown(command: str) -> None:
+    assert command in cli.commands
+    assert f"crosscheck {command}" in README
+    assert set(cli.commands) == {"run", "frames", "engines", "render", "completion"}
+
+
+def test_every_source_and_robot_is_listed() -> None:
+    for source in registered():
+        assert f"| `{source}` |" in README
+    for folder in (ROOT / "models").iterdir():
+        assert re.search(rf"\b{folder.name}\b", README)
+
+
+def test_files_it_names_are_there() -> None:
+    for name in (*re.findall(r"\]\(([^)]+)\)", README), "CONTRIBUTING.md", "CHANGELOG.md", "urdf/ur5e.urdf"):
+        assert (ROOT / name).exists(), name
