@@ -12,8 +12,8 @@ from harness.description.configurations import Configuration
 from harness.description.published import Published
 from harness.engines.registry import adapter_of
 from harness.errors import CrosscheckError
+from harness.gate import verdict
 from harness.report import document as doc
-from harness.report.text import metres, radians
 from harness.results import Results
 
 
@@ -25,10 +25,11 @@ def assemble(results: Results) -> doc.Report:
         for configuration in results.model.configurations.fixed
         for claim in configuration.published
     ]
+    settings = _settings(results)
     return doc.Report(
         robot=_robot(results),
-        settings=_settings(results),
-        verdict=verdict(results.model.name, sources, published, total=_settings(results).fixed + results.options.samples),
+        settings=settings,
+        verdict=verdict(results.model.name, sources, published, settings),
         sources=sources,
         frames=_frames(results),
         unmapped=_unmapped(results),
@@ -37,65 +38,6 @@ def assemble(results: Results) -> doc.Report:
         lint=_lint(results),
         environment=_environment(results),
     )
-
-
-def verdict(robot: str, sources: list[doc.Source], published: list[doc.PublishedResult], total: int) -> doc.Verdict:
-    """The gate. A disagreement found (1) stays found even if a required source is missing (3)."""
-    wrong, missing = [], []
-    for source in sources:
-        if source.verdict in ("disagrees", "invalid placements"):
-            wrong.append(f"{source.name}: {describe(source)}")
-        elif source.status != "ran" and source.required:
-            install = f" ({source.install})" if source.install else ""
-            missing.append(f"{source.name} is required and {source.status}: {source.reason}{install}")
-    for claim in published:
-        if claim.found != claim.status:
-            wrong.append(
-                f"published placement of DH frame {claim.frame} at {claim.configuration!r} is filed as {claim.status!r} "
-                f"and was found {claim.found!r}, off by {claim.position_error:.3g} m ({claim.provenance})"
-            )
-    compared = [s for s in sources if s.frames]
-    if not compared and not missing and not wrong:
-        missing.append("no source was compared: " + "; ".join(f"{s.name} {s.status}" for s in sources))
-    skipped = [s.name for s in sources if s.status != "ran" and not s.required]
-    if wrong:
-        sentence = f"{robot} DISAGREES: {wrong[0]}"
-        return doc.Verdict(exit_code=1, sentence=sentence, reasons=wrong + missing)
-    if missing:
-        return doc.Verdict(exit_code=3, sentence=f"{robot} IS NOT VERIFIED: {missing[0]}", reasons=missing)
-    accepted = sum(f.verdict == "accepted" for s in sources for f in s.frames)
-    sentence = f"{robot} AGREES: {len(compared)} sources within tolerance of the reference at {total} configurations"
-    if accepted:
-        sentence += f", {accepted} deviations as accepted"
-    if skipped:
-        sentence += f"; not run: {', '.join(skipped)}"
-    return doc.Verdict(exit_code=0, sentence=sentence)
-
-
-def describe(source: doc.Source) -> str:
-    """Where and by how much a source is off, in one clause."""
-    if source.verdict == "invalid placements" and source.validity is not None and source.validity.first is not None:
-        v = source.validity
-        return (
-            f"{v.invalid} of {v.checked} placements are not rigid transforms (residual {v.residual:.2g}), "
-            f"first {v.first_frame} at {v.first.label if v.first else ''}"
-        )
-    worst = next(f for f in source.frames if f.frame == source.worst_frame)
-    failing = [f for f in source.frames if f.verdict not in ("agrees", "accepted")]
-    if worst.verdict in ("agrees", "accepted"):
-        worst = failing[0]
-    if worst.verdict == "not compared":
-        return f"frame {worst.frame} was not compared: the engine does not have it or returned nothing finite"
-    by = f"{worst.frame} off by {metres(worst.position.max)}, {radians(worst.rotation.max)}"
-    if worst.verdict.startswith("deviation") and worst.accepted:
-        by += f"; the {worst.verdict} from the accepted {worst.accepted.position:g} m, {worst.accepted.rotation:g} rad"
-    where = (
-        worst.position.worst
-        if worst.position.max / source.tolerance.position >= (worst.rotation.max / source.tolerance.rotation)
-        else worst.rotation.worst
-    )
-    first = f"; first frame that disagrees: {source.first_disagreeing_frame}" if failing[0].frame != worst.frame else ""
-    return f"{by} at {where.label if where else '?'}{first}"
 
 
 def _robot(results: Results) -> doc.Robot:
@@ -121,7 +63,7 @@ def _settings(results: Results) -> doc.Settings:
     return doc.Settings(
         reference=results.participants[0].name,
         sources=[p.name for p in results.participants],
-        selection="command line" if options.sources else "model",
+        not_chosen=[s.name for s in results.model.file.source if s.name not in {p.name for p in results.participants}],
         fixed=fixed,
         samples=options.samples,
         seed=options.seed,
@@ -201,7 +143,10 @@ def _lint(results: Results) -> list[doc.Lint]:
         doc.Lint(code=f.code, level=f.level, subject=f.subject, message=f"URDF line {f.line}: {f.message}")
         for f in results.model.findings
     ]
-    found += [doc.Lint(code="suspect-number", level="warning", subject=s.where, message=s.why) for s in results.model.suspects]
+    found += [
+        doc.Lint(code="suspect-number", level="warning", subject=s.where, message=f"{s.where}: {s.why}")
+        for s in results.model.suspects
+    ]
     return found
 
 

@@ -22,7 +22,7 @@ from harness.description.locate import default_models_dir, find_model, model_fol
 from harness.description.model import load_model
 from harness.engines.registry import REFERENCE, registered
 from harness.errors import CrosscheckError, InputError
-from harness.inspect import show_engines, show_frames
+from harness.overview import show_engines, show_frames
 from harness.report.document import Report
 from harness.report.files import prepare, write_index, write_rendered, write_report
 from harness.report.json_file import read_report

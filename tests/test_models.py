@@ -213,3 +213,10 @@ def test_dh_only_model(copy_model: Callable[..., Path]) -> None:
         file.write('[[source]]\nname = "urdf:pinocchio"\n')
     with pytest.raises(CrosscheckError, match=r"'urdf:pinocchio' needs a \[urdf\] table"):
         load_model(folder)
+
+
+def test_a_joint_that_no_mapped_frame_moves_with(copy_model: Callable[..., Path]) -> None:
+    folder = copy_model("ur5")
+    (folder / "frames.toml").write_text('[[frame]]\nname = "base"\ndh = 0\n[[frame]]\nname = "wrist"\ndh = 5\n')
+    with pytest.raises(ModelFileError, match="no mapped frame moves with joint 'wrist_3_joint'"):
+        load_model(folder)

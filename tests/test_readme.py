@@ -10,8 +10,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from pydantic import BaseModel
 
 from harness.cli import cli
+from harness.description.configurations import ConfigurationsFile
+from harness.description.frames import FramesFile
+from harness.description.model import ModelFile
 from harness.engines.registry import registered
 
 ROOT = Path(__file__).parent.parent
@@ -63,3 +67,14 @@ def test_every_source_and_robot_is_listed() -> None:
 def test_files_it_names_are_there() -> None:
     for name in (*re.findall(r"\]\(([^)]+)\)", README), "CONTRIBUTING.md", "CHANGELOG.md", "urdf/ur5e.urdf"):
         assert (ROOT / name).exists(), name
+
+
+@pytest.mark.parametrize("table", [ModelFile, FramesFile, ConfigurationsFile])
+def test_every_key_of_a_model_file_is_described(table: type[BaseModel]) -> None:
+    """The page goes stale the moment a key is added that it does not name."""
+    text = (ROOT / "docs" / "model-files.md").read_text()
+    for key in table.model_json_schema()["properties"]:
+        assert f"`[{key}]`" in text or f"`[[{key}]]`" in text or f"`{key}`" in text or f"`[{key}." in text, key
+    for name, part in table.model_json_schema().get("$defs", {}).items():
+        for key in part.get("properties", {}):
+            assert re.search(rf"`{key}\b|\b{key} =|\.{key}\]", text), f"{name}.{key}"

@@ -127,7 +127,18 @@ def resolve_frames(file: FramesFile, table: DHTable, urdf: Urdf | None, path: Pa
         if mapped.relation == "identical":
             _once(taken, ("dh", mapped.dh), i, path, f"{key}.dh", f"DH frame {mapped.dh} without an offset")
         frames.append(mapped)
+    _reaches_every_joint(frames, table, path)
     return FrameMap(tuple(frames), _base(frames, table, path))
+
+
+def _reaches_every_joint(frames: list[MappedFrame], table: DHTable, path: Path) -> None:
+    """A joint behind the last mapped frame would never be checked, and the gate would pass by accident."""
+    last = max(table.frames.index(frame.dh) for frame in frames)
+    beyond = [row.name for i, row in enumerate(table.rows, start=1) if row.kind != "fixed" and table.frames.index(str(i)) > last]
+    if beyond:
+        raise MappingError(
+            f"no mapped frame moves with joint {beyond[0]!r}", where=path, hint="map a frame at the end of the chain"
+        )
 
 
 def _once(seen: dict[Any, int], item: Any, i: int, path: Path, key: str, what: str) -> None:

@@ -194,11 +194,12 @@ class Robot(Part):
 
 
 class Settings(Part):
-    """What was asked for. `fixed` and `samples` count configurations, `subset` those on which all pairs are compared."""
+    """What was asked for. `not_chosen`: sources of model.toml that the command line left out. `fixed` and `samples` count
+    configurations, `subset` those on which all pairs are compared."""
 
     reference: str
     sources: list[str]
-    selection: Literal["model", "command line"]
+    not_chosen: list[str] = []
     fixed: int
     samples: int
     seed: int

@@ -11,6 +11,7 @@ from harness.report.text import metres, numbers, plain, radians
 
 _STYLE = {0: "bold green", 1: "bold red", 3: "bold yellow"}
 MAX_REASONS = 6
+MAX_WARNINGS = 4
 _WORD = {0: "PASS", 1: "FAIL", 3: "INCOMPLETE"}
 
 
@@ -36,6 +37,11 @@ def show(report: Report, console: Console) -> None:
         note = f"  published placements: {len(report.published) - len(wrong)} hold, {len(wrong)} wrong"
         as_filed = all(p.found == p.status for p in report.published)
         console.print(Text(note + (" (as filed)" if as_filed else ""), style="" if as_filed else "red"))
+    warnings = [finding for finding in report.lint if finding.level == "warning"]
+    for finding in warnings[:MAX_WARNINGS]:
+        console.print(Text(f"  {plain(finding.message)}", style="yellow"), soft_wrap=True)
+    if (more := len(warnings) - MAX_WARNINGS) > 0:
+        console.print(Text(f"  and {more} more warnings in the report", style="yellow"))
     if report.unmapped:
         console.print(Text(f"  not mapped, so not checked: {plain(', '.join(report.unmapped))}", style="yellow"), soft_wrap=True)
 

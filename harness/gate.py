@@ -1,0 +1,74 @@
+"""The gate: from what every source did to one exit code, and a sentence that says why."""
+
+from __future__ import annotations
+
+from harness.report import document as doc
+from harness.report.text import metres, radians
+
+
+def verdict(robot: str, sources: list[doc.Source], published: list[doc.PublishedResult], settings: doc.Settings) -> doc.Verdict:
+    """The gate. A disagreement found (1) stays found even if a required source is missing (3)."""
+    wrong, missing = [], []
+    for source in sources:
+        if source.verdict in ("disagrees", "invalid placements"):
+            wrong.append(f"{source.name}: {describe(source)}")
+        elif source.status != "ran" and source.required:
+            install = f" ({source.install})" if source.install else ""
+            missing.append(f"{source.name} is required and {source.status}: {source.reason}{install}")
+    if misfiled := [claim for claim in published if claim.found != claim.status]:
+        wrong.append(_misfiled(misfiled))
+    compared = [s for s in sources if s.frames]
+    if not compared and not missing and not wrong:
+        missing.append("no source was compared: " + "; ".join(f"{s.name} {s.status}" for s in sources))
+    skipped = [s.name for s in sources if s.status != "ran" and not s.required]
+    if wrong:
+        sentence = f"{robot} DISAGREES: {wrong[0]}"
+        return doc.Verdict(exit_code=1, sentence=sentence, reasons=wrong + missing)
+    if missing:
+        return doc.Verdict(exit_code=3, sentence=f"{robot} IS NOT VERIFIED: {missing[0]}", reasons=missing)
+    accepted = sum(f.verdict == "accepted" for s in sources for f in s.frames)
+    count = f"{len(compared)} source{'s' if len(compared) > 1 else ''}"
+    sentence = f"{robot} AGREES: {count} within tolerance of the reference at {settings.fixed + settings.samples} configurations"
+    if accepted:
+        sentence += f", {accepted} deviations as accepted"
+    if skipped:
+        sentence += f"; not run: {', '.join(skipped)}"
+    if settings.not_chosen:
+        sentence += f"; not chosen: {', '.join(settings.not_chosen)}"
+    return doc.Verdict(exit_code=0, sentence=sentence)
+
+
+def _misfiled(claims: list[doc.PublishedResult]) -> str:
+    first, more = claims[0], len(claims) - 1
+    rotation = "" if first.rotation_error is None else f", {first.rotation_error:.2g} in the rotation"
+    return (
+        f"published placement of DH frame {first.frame} in {first.relative_to} at {first.configuration!r} is filed as "
+        f"{first.status!r} and was found {first.found!r}: off by {metres(first.position_error)}{rotation}"
+        + (f" (and {more} more like it)" if more else "")
+    )
+
+
+def describe(source: doc.Source) -> str:
+    """Where and by how much a source is off, in one clause."""
+    if source.verdict == "invalid placements" and source.validity is not None and source.validity.first is not None:
+        v = source.validity
+        return (
+            f"{v.invalid} of {v.checked} placements are not rigid transforms (residual {v.residual:.2g}), "
+            f"first {v.first_frame} at {v.first.label if v.first else ''}"
+        )
+    worst = next(f for f in source.frames if f.frame == source.worst_frame)
+    failing = [f for f in source.frames if f.verdict not in ("agrees", "accepted")]
+    if worst.verdict in ("agrees", "accepted"):
+        worst = failing[0]
+    if worst.verdict == "not compared":
+        return f"frame {worst.frame} was not compared: the engine does not have it or returned nothing finite"
+    by = f"{worst.frame} off by {metres(worst.position.max)}, {radians(worst.rotation.max)}"
+    if worst.verdict.startswith("deviation") and worst.accepted:
+        by += f"; the {worst.verdict} from the accepted {worst.accepted.position:g} m, {worst.accepted.rotation:g} rad"
+    where = (
+        worst.position.worst
+        if worst.position.max / source.tolerance.position >= (worst.rotation.max / source.tolerance.rotation)
+        else worst.rotation.worst
+    )
+    first = f"; first frame that disagrees: {source.first_disagreeing_frame}" if failing[0].frame != worst.frame else ""
+    return f"{by} at {where.label if where else '?'}{first}"
