@@ -136,6 +136,12 @@ def test_wrong_input(cli: Cli, copy_model: Callable[..., Path], tmp_path: Path, 
     assert (tmp_path / "reports" / "ur5e.json").read_text() == "an earlier report"
 
 
+def test_a_urdf_package_that_is_not_installed(cli: Cli, copy_model: Callable[..., Path]) -> None:
+    folder = copy_model("ur5", ("model.toml", 'package = "example-robot-data"', 'package = "no-such-robots"'))
+    result = cli("run", "ur5", "--models", str(folder.parent), "--quiet")
+    one_line_error(result, 3, "no-such-robots is not installed; pip install no-such-robots")
+
+
 def test_an_unwritable_output_folder(cli: Cli, tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("a file, not a folder")
     one_line_error(cli("run", "ur5", "--out", "taken"), 2, "taken: --out: cannot write reports here: .*; choose another --out")

@@ -55,6 +55,7 @@ UR5_ERRORS: list[tuple[Edit, str]] = [
     (("model.toml", "[tolerance]\nposition = 1e-10", '[tolerance]\nposition = "1 mm"'), "tolerance.position: expected a number"),
     (("model.toml", "[tolerance]\nposition = 1e-10", "[tolerance]\nposition = true"), "tolerance.position: expected a number"),
     (("model.toml", 'name = "ur5"', 'name = "../ur5"'), "model.toml: name: string should match pattern"),
+    (("model.toml", 'name = "ur5"', 'name = "index"'), "model.toml: name: expected a name other than index, report.schema"),
     (("model.toml", 'name = "ur5"', "name = 5"), "model.toml: name: input should be a valid string, got 5"),
     (("model.toml", "[tolerance]", "[tolerance"), r"model.toml: not TOML: .*line"),
     (("model.toml", "dh:pinocchio", "urdf:pinocchio"), r"source\[1\].name: source 'urdf:pinocchio' is there twice"),

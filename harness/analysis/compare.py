@@ -24,6 +24,7 @@ Mask: TypeAlias = NDArray[np.bool_]
 
 CHUNK = 1024
 VALID = 1e-6
+HUGE = 1e100  # beyond this a length is as good as infinite: its square would be
 
 
 @dataclass
@@ -111,10 +112,10 @@ class Comparison:
         residual = rotation_residual(C)
         worst = float(residual.max(initial=0.0))
         last_row_ok = bool(np.array_equal(T[:, :, 3, :], np.broadcast_to([0.0, 0.0, 0.0, 1.0], (*T.shape[:2], 4))))
-        if worst <= VALID and last_row_ok and np.isfinite(C[:, 3].sum()):
+        if worst <= VALID and last_row_ok and np.abs(C[:, 3]).max(initial=0.0) < HUGE:
             validity.residual = max(validity.residual, worst)
             return None
-        finite: Mask = np.asarray(np.isfinite(C).all(axis=(1, 2)))
+        finite: Mask = np.asarray((np.abs(C) < HUGE).all(axis=(1, 2)))
         last = np.abs(T[:, :, 3, :] - [0.0, 0.0, 0.0, 1.0]).max(axis=2).T
         good = finite & (residual <= VALID) & (last <= VALID)
         validity.residual = max(validity.residual, float(np.where(finite, residual, 0.0).max(initial=0.0)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from importlib import metadata
 from pathlib import Path, PurePosixPath
 
@@ -27,14 +28,17 @@ def model_folders(models: Path) -> dict[str, Path]:
 
 
 def find_model(robot: str, models: Path) -> Path:
-    """The folder of one robot: a name under `models`, or a path to a folder. Raises ModelFileError."""
+    """The folder of one robot: a path if it has a slash, else a name under `models`. Raises ModelFileError."""
     path = Path(robot)
-    if (path / "model.toml").is_file():
+    is_model = (path / "model.toml").is_file()
+    if is_model and os.sep in robot:
         return path
     folders = model_folders(models)
-    if robot not in folders:
-        raise ModelFileError(f"no robot model {robot!r}; {nearest(robot, folders)}", where=models)
-    return folders[robot]
+    if robot in folders:
+        return folders[robot]
+    if is_model:
+        return path
+    raise ModelFileError(f"no robot model {robot!r}; {nearest(robot, folders)}", where=models)
 
 
 def locate_urdf(file: str, package: str | None, folder: Path) -> Path:

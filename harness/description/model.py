@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from harness.description.configurations import ConfigurationSet, ConfigurationsFile, resolve_configurations
 from harness.description.dh import Convention, DHTable, SuspectNumber, read_dh_csv
@@ -22,6 +22,7 @@ from harness.description.values import Number, Strict, Transform
 from harness.errors import MappingError, ModelFileError, nearest
 
 SourceName = str
+RESERVED = ("index", "report.schema")
 
 
 class Provenance(Strict):
@@ -98,6 +99,13 @@ class ModelFile(Strict):
     urdf: UrdfEntry | None = None
     source: list[SourceEntry] = Field(min_length=1)
     accepted: list[AcceptedEntry] = []
+
+    @field_validator("name")
+    @classmethod
+    def _not_reserved(cls, name: str) -> str:
+        if name.lower() in RESERVED:
+            raise ValueError(f"expected a name other than {', '.join(RESERVED)}: those files are taken in the reports' folder")
+        return name
 
 
 @dataclass(frozen=True)
