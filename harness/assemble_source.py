@@ -48,24 +48,22 @@ def _judged(results: Results, comparison: Comparison, participant: Participant, 
     """Add the frames, and the verdict that follows from them."""
     reference = results.participants[0]
     tolerance = pair_tolerance(participant.planned, reference.planned)
+    ends = [end for end in (bound, reference.bound) if end is not None]
     frames = [
         _frame(results, comparison, participant.name, reference.name, index, tolerance)
-        for index, frame in enumerate(results.model.frames.frames)
-        if frame.name in bound.missing or comparison.position[participant.name].count[index] or bound.view.slots[index] >= 0
+        for index in range(len(results.model.frames.frames))
+        if all(end.should_have(index) for end in ends)
     ]
     failing = [f for f in frames if f.verdict in FAILING]
     invalid = part.validity is not None and part.validity.invalid > 0
     worst = max(frames, key=lambda f: max(f.position.max / tolerance[0], f.rotation.max / tolerance[1]))
     noise = classify(max(f.position.max for f in frames), max(f.rotation.max for f in frames), comparison.reach)
-    verdict = (
-        "invalid placements"
-        if invalid
-        else "disagrees"
-        if failing
-        else "agrees as accepted"
-        if any(f.verdict == "accepted" for f in frames)
-        else "agrees"
-    )
+    if invalid:
+        verdict = "invalid placements"
+    elif failing:
+        verdict = "disagrees"
+    else:
+        verdict = "agrees as accepted" if any(f.verdict == "accepted" for f in frames) else "agrees"
     return part.model_copy(
         update={
             "verdict": verdict,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -63,7 +64,7 @@ def plan(model: RobotModel, chosen: Sequence[str], reference: str) -> list[Plann
     names = [reference, *(chosen or [REFERENCE, *entries])]
     planned = []
     for name in dict.fromkeys(names):
-        adapter_known(name)
+        _check_known(name)
         if not name.startswith("dh:") and model.urdf is None:
             raise InputError(f"{model.name} has no [urdf] table for it", key=name)
         entry = entries.get(name)
@@ -77,14 +78,10 @@ def plan(model: RobotModel, chosen: Sequence[str], reference: str) -> list[Plann
     return planned
 
 
-def adapter_known(name: str) -> None:
-    """Raise InputError unless `name` is a registered source (a broken adapter is known, and will say so itself)."""
-    try:
+def _check_known(name: str) -> None:
+    """Raise InputError unless `name` is a registered source; a broken adapter is known, and will say so itself."""
+    with contextlib.suppress(EngineUnavailable):
         adapter_of(name)
-    except InputError:
-        raise
-    except Exception:  # EngineUnavailable: that is this source's result, not wrong input
-        return
 
 
 def pair_tolerance(a: Planned, reference: Planned) -> tuple[float, float]:
@@ -121,15 +118,19 @@ class Bound:
     """An engine bound to a model: asked in the model's joint order, answering at the mapped frames.
 
     `frames` are the engine's frame names that are read; `view` tells how mapped frames follow from them; `missing` are
-    mapped frames the engine does not have, though its description does; `seconds` is the time spent inside the engine.
+    indices of mapped frames the engine does not have, though its description does; `seconds` is the time spent inside the engine.
     """
 
     engine: Engine
     joint_map: JointMap
     frames: tuple[str, ...]
     view: View
-    missing: tuple[str, ...] = ()
+    missing: tuple[int, ...] = ()
     seconds: float = 0.0
+
+    def should_have(self, frame: int) -> bool:
+        """Whether the mapped frame with this index can be expected of this source: its description has it."""
+        return self.view.slots[frame] >= 0 or frame in self.missing
 
     def raw(self, q: Array) -> Array:
         """Placements as the engine returns them, q (N, n) in model order: (N, len(frames), 4, 4)."""
@@ -170,7 +171,7 @@ def bind(engine: Engine, model: RobotModel, offsets: Mapping[str, Array]) -> Bou
     wanted = [f.urdf for f in frames]
     names = [name for name in dict.fromkeys(wanted) if name is not None and name in engine.frames]
     slots = tuple(names.index(name) if name in names else -1 for name in wanted)
-    missing = tuple(f.name for f in frames if f.urdf is not None and f.urdf not in names)
+    missing = tuple(i for i, f in enumerate(frames) if f.urdf is not None and f.urdf not in names)
     view = View(slots, np.tile(np.eye(4), (len(frames), 1, 1)), names.index(base))
     return Bound(engine, joint_map, tuple(names), view, missing=missing)
 

@@ -425,3 +425,12 @@ def test_tolerances_add_up_against_another_reference(models: dict[str, RobotMode
     assert source(report, "dh:numpy").tolerance.position == 1e-10
     assert source(report, "dh:pinocchio").tolerance.position == pytest.approx(1e-10 + 1e-13)
     assert source(report, "urdf:yourdfpy").tolerance.position == pytest.approx(2e-10)
+
+
+def test_a_dh_frame_without_a_link_is_left_out_against_a_urdf_reference(models: dict[str, RobotModel]) -> None:
+    """Stanford's dh0 has no link: no fault of the table's, and none of the URDF's."""
+    report = crosscheck(models["stanford"], Options(20, 0, ("dh:numpy", "dh:pinocchio"), reference="urdf:pinocchio"))
+    assert report.verdict.exit_code == 0, report.verdict.reasons
+    assert "dh0" not in {f.frame for f in source(report, "dh:numpy").frames}
+    report = crosscheck(models["stanford"], Options(20, 0, FAST))
+    assert "dh0" in {f.frame for f in source(report, "dh:pinocchio").frames}
