@@ -42,6 +42,7 @@ class InputError(CrosscheckError, ValueError):
             place = f"{place}:{line}" if place else f"line {line}"
         if key is not None:
             place = f"{place}: {key}" if place else key
+        problem = " ".join(problem.split("\n"))  # parsers report over several lines
         text = f"{place}: {problem}" if place else problem
         super().__init__(f"{text}; {hint}" if hint else text)
 

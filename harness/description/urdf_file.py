@@ -69,7 +69,8 @@ def _root(data: bytes, path: Path) -> etree._Element:
     try:
         robot = etree.fromstring(data, parser)
     except etree.XMLSyntaxError as error:
-        raise UrdfError(f"not well-formed XML: {error.msg}", where=path, line=error.lineno) from None
+        what = str(error.msg).split(", line ")[0].strip()
+        raise UrdfError(f"not well-formed XML: {what}", where=path, line=error.lineno) from None
     except ValueError as error:  # e.g. control characters
         raise UrdfError(f"not well-formed XML: {error}", where=path) from None
     # Entities can be declared only in a DTD, so refusing every DTD refuses bombs and external files alike.
