@@ -19,41 +19,9 @@ from harness.errors import CrosscheckError, UrdfError
 FILES = ("dh.csv", "model.toml", "frames.toml", "configurations.toml")
 PIECES = st.sampled_from(
     [
-        "",
-        '"',
-        "[",
-        "]",
-        "{",
-        "}",
-        "=",
-        ",",
-        "#",
-        "\n",
-        "\x00",
-        "\x1b",
-        "-",
-        "nan",
-        "inf",
-        "1e999",
-        "pi/0",
-        "[[frame]]\n",
-        "true",
-        "9" * 400,
-    ]
-    + [
-        "<",
-        ">",
-        "<link/>",
-        "<joint name='x'/>",
-        "&amp;",
-        "é",
-        "\ud7ff",
-        "0 0 1",
-        "fixed",
-        "tool0",
-        "base",
-        "revolute",
-        "[joints]\n",
+        *("", '"', "[", "]", "{", "}", "=", ",", "#", "\n", "\x00", "\x1b", "-", "<", ">", "&amp;", "é", "\ud7ff"),
+        *("nan", "inf", "1e999", "pi/0", "true", "9" * 400, "0 0 1", "fixed", "revolute", "tool0", "base"),
+        *("[[frame]]\n", "[joints]\n", "<link/>", "<joint name='x'/>"),
     ]
 )
 
