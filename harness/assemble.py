@@ -63,6 +63,8 @@ def _settings(results: Results) -> doc.Settings:
     return doc.Settings(
         reference=results.participants[0].name,
         sources=[p.name for p in results.participants],
+        gate=results.model.file.gate,
+        certify=options.certify,
         not_chosen=[s.name for s in results.model.file.source if s.name not in {p.name for p in results.participants}],
         fixed=fixed,
         samples=options.samples,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from harness.analysis.compare import Comparison
 from harness.analysis.noise import NoiseClass, classify
 from harness.analysis.statistics import Stream
@@ -49,8 +51,9 @@ def _judged(results: Results, comparison: Comparison, participant: Participant, 
     reference = results.participants[0]
     tolerance = pair_tolerance(participant.planned, reference.planned)
     ends = [end for end in (bound, reference.bound) if end is not None]
+    certificate = _certificate(results, participant.name)
     frames = [
-        _frame(results, comparison, participant.name, reference.name, index, tolerance)
+        _frame(results, comparison, participant.name, reference.name, index, tolerance, certificate)
         for index in range(len(results.model.frames.frames))
         if all(end.should_have(index) for end in ends)
     ]
@@ -74,20 +77,36 @@ def _judged(results: Results, comparison: Comparison, participant: Participant, 
             "noise_text": noise.text,
             "explained_by": _evidence(results, part.traits, noise),
             "reproducer": _reproducer(results, participant.name),
+            "certificate": certificate,
         }
     )
 
 
 def _frame(
-    results: Results, comparison: Comparison, source: str, reference: str, index: int, tolerance: tuple[float, float]
+    results: Results,
+    comparison: Comparison,
+    source: str,
+    reference: str,
+    index: int,
+    tolerance: tuple[float, float],
+    certificate: doc.Certificate | None,
 ) -> doc.FrameResult:
     frame = results.model.frames.frames[index]
     position = _statistics(results, comparison.position[source], index)
     rotation = _statistics(results, comparison.rotation[source], index)
     on_file = deviation_on_file(results.model, source, reference, frame.name)
     deviation = on_file[0] if on_file else None
+    bound = next((b for b in certificate.frames if b.frame == frame.name), None) if certificate else None
+    # What the certificate's search has found counts like what the samples have shown: both were evaluated.
+    found = (
+        max(position.max, bound.position_found if bound else 0.0),
+        max(rotation.max, bound.rotation_found if bound else 0.0),
+    )
     # A frame that was never compared cannot agree: not one finite pair of placements was seen.
-    verdict = judge(position.max, rotation.max, tolerance, deviation) if position.count else "not compared"
+    verdict = judge(*found, tolerance, deviation) if position.count else "not compared"
+    if verdict == "agrees" and results.model.file.gate == "certified":
+        proven = bound is not None and bound.position_upper <= tolerance[0] and bound.rotation_upper <= tolerance[1]
+        verdict = "agrees" if proven else "not certified"
     return doc.FrameResult(
         frame=frame.name,
         verdict=verdict,
@@ -170,6 +189,40 @@ def _evidence(results: Results, traits: list[doc.TraitNote], noise: NoiseClass) 
     if noise.key == "model":
         evidence += [t.text for t in traits if t.applies and t.lint]
     return evidence
+
+
+def _certificate(results: Results, source: str) -> doc.Certificate | None:
+    certified = results.certified.get(source)
+    if certified is None:
+        return None
+    bounds, position, rotation = certified.bounds, certified.position_found, certified.rotation_found
+    frames = []
+    if bounds is not None and position is not None and rotation is not None:
+        frames = [
+            doc.FrameBound(
+                frame=results.model.frames.frames[index].name,
+                position_upper=float(bounds.position[i]),
+                position_found=float(position[i]),
+                rotation_upper=float(bounds.rotation[i]),
+                rotation_found=float(rotation[i]),
+                method=bounds.method[i],
+            )
+            for i, index in enumerate(certified.frames)
+        ]
+    return doc.Certificate(
+        status="certified" if frames else "refused",
+        reason=certified.reason,
+        form=certified.form,
+        nodes=certified.nodes,
+        residual=_finite(certified.residual),
+        reference_residual=_finite(certified.reference_residual),
+        limit=_finite(certified.limit),
+        frames=frames,
+    )
+
+
+def _finite(x: float) -> float | None:
+    return x if math.isfinite(x) else None
 
 
 def _reproducer(results: Results, source: str) -> doc.Reproducer | None:

@@ -79,6 +79,7 @@ def cli() -> None:
     help="Source that the others are compared with.",
 )
 @click.option("--samples", type=int, default=2000, show_default=True, help="Random configurations, besides the fixed ones.")
+@click.option("--certify/--no-certify", default=True, show_default=True, help="Prove a bound for all configurations.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random configurations.")
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("reports"), show_default=True, help="Folder for the reports."
@@ -92,6 +93,7 @@ def run(
     reference: str,
     samples: int,
     seed: int,
+    certify: bool,
     out: Path,
     quiet: bool,
     as_json: bool,
@@ -111,9 +113,9 @@ def run(
             if model.name in names:
                 raise InputError(f"robot name {model.name!r} is also that of {names[model.name]}", where=folder)
             names[model.name] = folder
-            command = _command(folder, models, samples, seed, sources, reference)
+            command = _command(folder, models, samples, seed, sources, reference, certify)
             with _progress(model.name, quiet or as_json) as advance:
-                report = crosscheck(model, Options(samples, seed, sources, reference, command), advance)
+                report = crosscheck(model, Options(samples, seed, sources, reference, command, certify), advance)
             write_report(report, out)
             _tell(report, quiet, as_json)
             codes.append(report.verdict.exit_code)
@@ -170,7 +172,9 @@ def _folders(robots: tuple[str, ...], models: Path) -> list[Path]:
     return list(dict.fromkeys(find_model(robot, models) for robot in robots))
 
 
-def _command(folder: Path, models: Path | None, samples: int, seed: int, sources: tuple[str, ...], reference: str) -> str:
+def _command(
+    folder: Path, models: Path | None, samples: int, seed: int, sources: tuple[str, ...], reference: str, certify: bool
+) -> str:
     inside = folder.parent == (models or default_models_dir())
     words = ["crosscheck", "run", folder.name if inside else str(folder)]
     if models is not None and inside:
@@ -179,7 +183,8 @@ def _command(folder: Path, models: Path | None, samples: int, seed: int, sources
         words += ["--source", source]
     if reference != REFERENCE:
         words += ["--reference", reference]
-    return shlex.join([*words, "--samples", str(samples), "--seed", str(seed)])
+    words += ["--samples", str(samples), "--seed", str(seed)]
+    return shlex.join(words if certify else [*words, "--no-certify"])
 
 
 @contextlib.contextmanager

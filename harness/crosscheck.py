@@ -10,6 +10,7 @@ import numpy as np
 from harness.analysis.compare import Comparison
 from harness.analysis.shrink import shrink
 from harness.assemble import assemble
+from harness.certificates import certify_all
 from harness.description.model import RobotModel
 from harness.engines.dh_numpy import DHNumpy
 from harness.engines.registry import load_engine
@@ -37,6 +38,8 @@ def crosscheck(model: RobotModel, options: Options, progress: Progress | None = 
     results.comparison = _compare(results, progress)
     if results.comparison is not None:
         results.reproduced = _reproduce(results, results.comparison)
+        if options.certify:
+            results.certified = certify_all(results)
     results.seconds = time.perf_counter() - started
     return assemble(results)
 

@@ -31,11 +31,27 @@ def verdict(robot: str, sources: list[doc.Source], published: list[doc.Published
     sentence = f"{robot} AGREES: {count} within tolerance of the reference at {settings.fixed + settings.samples} configurations"
     if accepted:
         sentence += f", {accepted} deviations as accepted"
+    sentence += _for_all(compared)
     if skipped:
         sentence += f"; not run: {', '.join(skipped)}"
     if settings.not_chosen:
         sentence += f"; not chosen: {', '.join(settings.not_chosen)}"
     return doc.Verdict(exit_code=0, sentence=sentence)
+
+
+def _for_all(compared: list[doc.Source]) -> str:
+    """What is proven for every configuration, if it is for every source; accepted deviations speak for themselves."""
+    frames = [
+        (bound.position_upper, bound.rotation_upper)
+        for s in compared
+        if s.certificate
+        for bound in s.certificate.frames
+        if next(f for f in s.frames if f.frame == bound.frame).verdict == "agrees"
+    ]
+    if not frames or not all(s.certificate and s.certificate.status == "certified" for s in compared):
+        return ""
+    aside = " (accepted deviations aside)" if any(f.verdict == "accepted" for s in compared for f in s.frames) else ""
+    return f"; for all configurations at most {metres(max(p for p, _ in frames))}, {radians(max(r for _, r in frames))}{aside}"
 
 
 def _misfiled(claims: list[doc.PublishedResult]) -> str:
@@ -60,6 +76,12 @@ def describe(source: doc.Source) -> str:
     failing = [f for f in source.frames if f.verdict not in ("agrees", "accepted")]
     if worst.verdict in ("agrees", "accepted"):
         worst = failing[0]
+    if worst.verdict == "not certified":
+        why = source.certificate.reason if source.certificate else "no certificate was made"
+        bound = next((b for b in source.certificate.frames if b.frame == worst.frame), None) if source.certificate else None
+        if bound is not None:
+            why = f"only {metres(bound.position_upper)}, {radians(bound.rotation_upper)} can be proven for all configurations"
+        return f"{worst.frame} is within tolerance where it was sampled, but {why}"
     if worst.verdict == "not compared":
         return f"frame {worst.frame} was not compared: the engine does not have it or returned nothing finite"
     by = f"{worst.frame} off by {metres(worst.position.max)}, {radians(worst.rotation.max)}"

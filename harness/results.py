@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from harness.analysis.certify import Bounds
 from harness.analysis.compare import Comparison
 from harness.description.model import RobotModel
 from harness.engines.registry import REFERENCE
@@ -21,6 +23,7 @@ class Options:
     sources: tuple[str, ...] = ()
     reference: str = REFERENCE
     command: str = ""
+    certify: bool = True
 
     def __post_init__(self) -> None:
         """Refuse impossible numbers. Raises InputError."""
@@ -42,6 +45,26 @@ class Reproduced:
     T_source: Array
 
 
+@dataclass(frozen=True)
+class Certified:
+    """A source's certificate against the reference, or why it has none (`reason`).
+
+    form: `grid` or `links`; nodes: configurations evaluated; residuals: how far each engine is from its own interpolant,
+    limit: how far rounding explains; frames: indices of the mapped frames certified; found: largest discrepancies seen.
+    """
+
+    reason: str = ""
+    form: str = ""
+    nodes: int = 0
+    residual: float = 0.0
+    reference_residual: float = 0.0
+    limit: float = 0.0
+    frames: Sequence[int] = ()
+    bounds: Bounds | None = None
+    position_found: Array | None = None
+    rotation_found: Array | None = None
+
+
 @dataclass
 class Results:
     """Everything a run found. `comparison` is None if the reference did not run; `in_house` is always there."""
@@ -54,4 +77,5 @@ class Results:
     in_house: Bound | None = None
     comparison: Comparison | None = None
     reproduced: dict[str, Reproduced] = field(default_factory=dict)
+    certified: dict[str, Certified] = field(default_factory=dict)
     seconds: float = 0.0

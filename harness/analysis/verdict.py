@@ -10,9 +10,11 @@ import numpy as np
 from harness.description.published import Published
 from harness.se3 import Array
 
-FrameVerdict: TypeAlias = Literal["agrees", "disagrees", "accepted", "deviation changed", "deviation vanished", "not compared"]
+FrameVerdict: TypeAlias = Literal[
+    "agrees", "disagrees", "accepted", "deviation changed", "deviation vanished", "not compared", "not certified"
+]
 
-FAILING: frozenset[str] = frozenset({"disagrees", "deviation changed", "deviation vanished", "not compared"})
+FAILING: frozenset[str] = frozenset({"disagrees", "deviation changed", "deviation vanished", "not compared", "not certified"})
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -94,6 +95,7 @@ class ModelFile(Strict):
     convention: Convention
     provenance: Provenance
     tolerance: Tolerance
+    gate: Literal["sampled", "certified"] = "sampled"
     base: Transform | None = None
     tool: Transform | None = None
     urdf: UrdfEntry | None = None

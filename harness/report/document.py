@@ -63,7 +63,9 @@ class FrameResult(Part):
     """One source at one mapped frame, against the reference."""
 
     frame: str
-    verdict: Literal["agrees", "disagrees", "accepted", "deviation changed", "deviation vanished", "not compared"]
+    verdict: Literal[
+        "agrees", "disagrees", "accepted", "deviation changed", "deviation vanished", "not compared", "not certified"
+    ]
     position: Statistics
     rotation: Statistics
     noise: str
@@ -101,6 +103,34 @@ class Validity(Part):
     first_frame: str = ""
 
 
+class FrameBound(Part):
+    """For every configuration: no discrepancy at this frame is above `upper`; `found` is the largest one seen."""
+
+    frame: str
+    position_upper: NonNegative
+    position_found: NonNegative
+    rotation_upper: NonNegative
+    rotation_found: NonNegative
+    method: str
+
+
+class Certificate(Part):
+    """Agreement for every angle of every revolute joint, and every prismatic joint within its range; or why there is none.
+
+    form: `grid` or `links`; nodes: configurations evaluated. residual, reference_residual: how far each engine is from the
+    interpolant of its own values at random configurations; limit: how far rounding explains.
+    """
+
+    status: Literal["certified", "refused"]
+    reason: str = ""
+    form: str = ""
+    nodes: int = 0
+    residual: NonNegative | None = None
+    reference_residual: NonNegative | None = None
+    limit: NonNegative | None = None
+    frames: list[FrameBound] = []
+
+
 class Source(Part):
     """One source: whether it ran, what it was given, and how it compares."""
 
@@ -124,6 +154,7 @@ class Source(Part):
     noise_text: str = ""
     explained_by: list[str] = []
     reproducer: Reproducer | None = None
+    certificate: Certificate | None = None
 
 
 class Frame(Part):
@@ -194,12 +225,15 @@ class Robot(Part):
 
 
 class Settings(Part):
-    """What was asked for. `not_chosen`: sources of model.toml that the command line left out. `fixed` and `samples` count
-    configurations, `subset` those on which all pairs are compared."""
+    """What was asked for. `not_chosen`: sources of model.toml that the command line left out. `gate`: what decides, the
+    configurations sampled or the certificate. `fixed` and `samples` count configurations, `subset` those on which all pairs
+    are compared."""
 
     reference: str
     sources: list[str]
     not_chosen: list[str] = []
+    gate: Literal["sampled", "certified"] = "sampled"
+    certify: bool = True
     fixed: int
     samples: int
     seed: int

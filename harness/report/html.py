@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from harness.report.document import PairResult, Report, Source, Statistics
-from harness.report.text import metres, numbers, plain, radians
+from harness.report.text import for_all, metres, numbers, plain, radians
 
 # ColorBrewer YlOrBr: light to dark, told apart by the colour-blind, always with the number beside it.
 _SCALE = ("#ffffe5", "#fff7bc", "#fee391", "#fec44f", "#fe9929", "#ec7014", "#cc4c02", "#993404", "#662506")
@@ -23,7 +23,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
         finalize=lambda value: type(value)(plain(value)) if isinstance(value, str) else value,
     )
-    env.filters.update(metres=metres, radians=radians, numbers=numbers, colour=colour, bars=bars)
+    env.filters.update(metres=metres, radians=radians, numbers=numbers, colour=colour, bars=bars, for_all=for_all)
     env.tests["failing"] = lambda verdict: verdict not in ("agrees", "agrees as accepted", "accepted", "reference")
     return env
 

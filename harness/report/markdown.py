@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from harness.report.document import Report, Source
-from harness.report.text import metres, numbers, plain, radians
+from harness.report.text import for_all, metres, numbers, plain, radians
 
 MARK = {0: "PASS", 1: "FAIL", 3: "INCOMPLETE"}
 MAX_ROWS = 12
@@ -21,8 +21,8 @@ def render_markdown(report: Report) -> str:
         f"{_md(report.robot.description)}. Reference {_code(report.settings.reference)}; {report.settings.fixed} fixed and "
         f"{report.settings.samples} random configurations, seed {report.settings.seed}.",
         "",
-        "| source | verdict | worst frame | position | rotation | tolerance | size of |",
-        "|---|---|---|---|---|---|---|",
+        "| source | verdict | worst frame | position | rotation | for all q | tolerance | size of |",
+        "|---|---|---|---|---|---|---|---|",
         *(_row(source) for source in report.sources if not source.reference),
         "",
         *_disagreements(report),
@@ -35,12 +35,12 @@ def render_markdown(report: Report) -> str:
 
 def _row(source: Source) -> str:
     if not source.frames:
-        return f"| {_code(source.name)} | {source.status} | | | | | {_md(source.reason)} |"
+        return f"| {_code(source.name)} | {source.status} | | | | | | {_md(source.reason)} |"
     frame = next(f for f in source.frames if f.frame == source.worst_frame)
     tolerance = f"{metres(source.tolerance.position)}, {radians(source.tolerance.rotation)}"
     return (
         f"| {_code(source.name)} | {source.verdict} | {_md(frame.frame)} | {metres(frame.position.max)} | "
-        f"{radians(frame.rotation.max)} | {tolerance} | {source.noise_text} |"
+        f"{radians(frame.rotation.max)} | {for_all(source)} | {tolerance} | {source.noise_text} |"
     )
 
 

@@ -7,7 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from harness.report.document import Report, Source
-from harness.report.text import metres, numbers, plain, radians
+from harness.report.text import for_all, metres, numbers, plain, radians
 
 _STYLE = {0: "bold green", 1: "bold red", 3: "bold yellow"}
 MAX_REASONS = 6
@@ -20,7 +20,7 @@ def show(report: Report, console: Console) -> None:
     code = report.verdict.exit_code
     console.print(Text(_WORD[code], style=_STYLE[code]), Text(plain(report.verdict.sentence)), soft_wrap=True)
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
-    for column in ("source", "verdict", "worst frame", "position", "rotation", "tolerance", "size of"):
+    for column in ("source", "verdict", "worst frame", "position", "rotation", "for all q", "tolerance", "size of"):
         table.add_column(column, overflow="fold")
     for source in report.sources:
         if not source.reference:
@@ -52,7 +52,7 @@ def _row(source: Source) -> tuple[Text, ...]:
     name = Text(plain(source.name))
     if not source.frames:
         install = f" ({source.install})" if source.install else ""
-        return name, verdict, Text(""), Text(""), Text(""), Text(""), Text(plain(source.reason + install))
+        return name, verdict, *(Text("") for _ in range(5)), Text(plain(source.reason + install))
     frame = next(f for f in source.frames if f.frame == source.worst_frame)
     return (
         name,
@@ -60,6 +60,7 @@ def _row(source: Source) -> tuple[Text, ...]:
         Text(plain(frame.frame)),
         Text(metres(frame.position.max)),
         Text(radians(frame.rotation.max)),
+        Text(for_all(source)),
         Text(f"{metres(source.tolerance.position)}, {radians(source.tolerance.rotation)}"),
         Text(source.noise_text),
     )
@@ -80,5 +81,7 @@ def _located(source: Source, reference: str, console: Console) -> None:
         where = f"  {source.name}: {plain(r.frame)} at q = {numbers(r.q)} is {metres(r.position)}, {radians(r.rotation)} off"
         console.print(Text(where), soft_wrap=True)
         console.print(Text(f"    {reference} has it at {p_a}, {source.name} at {p_b}"), soft_wrap=True)
+    if source.certificate and source.certificate.status == "refused":
+        console.print(Text(f"    no certificate: {plain(source.certificate.reason)}"), soft_wrap=True)
     for text in source.explained_by:
         console.print(Text(f"    known: {plain(text)}"), soft_wrap=True)

@@ -6,6 +6,8 @@ import math
 import re
 from collections.abc import Iterable
 
+from harness.report.document import Source
+
 # C0 and C1 controls, line separators and bidirectional overrides: they change more than their own letters.
 _CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
 
@@ -32,3 +34,12 @@ def radians(x: float) -> str:
 def numbers(values: Iterable[float], digits: int = 6) -> str:
     """`[0.2, -1.1, 0]`."""
     return "[" + ", ".join(f"{0.0 if v == 0 else v:.{digits}g}" for v in values) + "]"
+
+
+def for_all(source: Source) -> str:
+    """The bound over every configuration at the frame where it is largest: `<= 1.6e-11 m`, or `refused`."""
+    if source.certificate is None:
+        return ""
+    if source.certificate.status == "refused":
+        return "refused"
+    return f"<= {metres(max(bound.position_upper for bound in source.certificate.frames))}"

@@ -1,0 +1,155 @@
+"""Agreement for every configuration: a proven upper bound on the discrepancy of two sources, and the largest one found.
+
+The difference of two placements is, like each of them, a polynomial in (1, cos q, sin q) of known degree, so its values on
+a small grid fix it everywhere. Two bounds on its largest value follow: the interpolation kernel's Lebesgue constant times
+the largest grid value, and the sum of its coefficients' norms; the smaller counts. The premise, that an engine's output *is*
+such a polynomial, is tested for each engine at random configurations. docs/theory.md has the derivations.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.analysis.interpolation import Axis, coefficient_sum, grid, weights
+from harness.se3 import Array
+
+# q (N, n) to placements (N, F, 4, 3): columns x, y, z axis and origin [m] of each frame.
+Evaluate: TypeAlias = Callable[[Array], Array]
+
+Indices: TypeAlias = NDArray[np.intp]
+
+TESTS = 64
+SWEEPS = 2
+SCAN = 96
+UNIT_ROUNDOFF = 2.0**-53
+_CHORD = 2.0 * math.sqrt(2.0)
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """One engine on the grid. values: (M, F, 4, 3). residual: largest entry by which the engine differs from its own
+    interpolant at random configurations; limit: what rounding explains; rounding: error allowed to one evaluation."""
+
+    values: Array
+    residual: float
+    limit: float
+    rounding: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the premise holds; never for NaN."""
+        return self.residual <= self.limit
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Proven upper bounds for each frame (F,), position [m] and rotation [rad], and which bound the position's is."""
+
+    position: Array
+    rotation: Array
+    method: tuple[str, ...]
+
+
+def rounding_of(joints: int, reach: float) -> float:
+    """Error allowed to one entry of a float64 placement: 16 (n + 2) u (1 + reach).
+
+    A product of n + 2 rigid factors commits at most gamma_4 = 4u per multiplication on entries bounded by 1 and the reach
+    (Higham, "Accuracy and Stability", section 3.5); the factor 4 above that covers sines, node positions and offsets.
+    """
+    return 16.0 * (joints + 2) * UNIT_ROUNDOFF * (1.0 + reach)
+
+
+def lebesgue(axes: list[Axis]) -> float:
+    """Lebesgue constant of the tensor-product grid: the product over the joints."""
+    return math.prod(axis.lebesgue for axis in axes)
+
+
+def sample(evaluate: Evaluate, axes: list[Axis], rng: np.random.Generator) -> Sampled:
+    """Evaluate an engine on the grid, and test the premise at random configurations over two whole turns and more.
+
+    Outside every joint limit on purpose: an engine that clamps or wraps there is no longer such a polynomial.
+    """
+    values = evaluate(grid(axes))
+    spread = np.array([(axis.upper - axis.lower) for axis in axes])
+    middle = np.array([(axis.upper + axis.lower) / 2 for axis in axes])
+    wide = np.array([1.0 if axis.periodic else 0.5 for axis in axes])
+    q = middle + rng.uniform(-1.0, 1.0, (TESTS, len(axes))) * spread * wide
+    with np.errstate(invalid="ignore", over="ignore"):
+        predicted = np.tensordot(weights(axes, q), values, axes=1)
+        residual = float(np.abs(evaluate(q) - predicted).max(initial=0.0))
+        reach = float(np.linalg.norm(values[:, :, 3], axis=-1).max(initial=0.0))
+    rounding = rounding_of(len(axes), reach)
+    return Sampled(values, residual, (1.0 + lebesgue(axes)) * rounding, rounding)
+
+
+def certify(a: Sampled, b: Sampled, axes: list[Axis]) -> Bounds:
+    """Upper bounds on |D(q)| over every q, D = a - b, from the grid values of two sources whose premise holds.
+
+    Rounding: interpolating values that are off by r misses by (1 + Lebesgue constant) r at most, and is added.
+    """
+    D = a.values - b.values
+    position, chord = D[:, :, 3, :], D[:, :, :3, :].reshape(*D.shape[:2], 9)
+    allowance = (1.0 + lebesgue(axes)) * (a.rounding + b.rounding)
+    bounds, methods = [], []
+    for part, entries in ((position, 3), (chord, 9)):
+        largest = np.linalg.norm(part, axis=-1).max(axis=0)
+        kernel, coefficients = lebesgue(axes) * largest, coefficient_sum(axes, part)
+        bounds.append(np.minimum(kernel, coefficients) + math.sqrt(entries) * allowance)
+        methods.append(np.where(coefficients <= kernel, "coefficients", "kernel"))
+    return Bounds(bounds[0], chord_angle(bounds[1]), tuple(str(m) for m in methods[0]))
+
+
+def chord_angle(chord: Array) -> Array:
+    """Rotation error [rad] of a Frobenius distance between rotations; see `se3.rotation_error`."""
+    return np.asarray(2.0 * np.arcsin(np.minimum(1.0, chord / _CHORD)))
+
+
+def ascend(difference: Evaluate, axes: list[Axis], starts: Array, frames: Indices, parts: Indices) -> Array:
+    """Climb from each start to a local maximum of its discrepancy, joint by joint.
+
+    difference: q (K, n) to D (K, F, 4, 3). starts: (S, n), each with the frame and the part (0 position, 1 rotation) it is
+    to maximise, (S,). Along one joint D is known exactly from as many values as it has nodes, so each step looks at the
+    whole circle. Returns the configurations, (S, n).
+    """
+    q = starts.copy()
+    each = np.arange(len(q))
+    for _ in range(SWEEPS if len(q) else 0):
+        for j, axis in enumerate(axes):
+            at_nodes = np.repeat(q, axis.count, axis=0)
+            at_nodes[:, j] = np.tile(axis.nodes, len(q))
+            D = difference(at_nodes)
+            values = D.reshape(len(q), axis.count, D.shape[1], 12)[each, :, frames]
+            candidates = np.linspace(axis.lower, axis.upper, SCAN + 1)
+            along = np.einsum("ck,skd->scd", axis.weights(candidates), values)
+            size = np.where((parts == 0)[:, None], _norm(along[..., 9:]), _norm(along[..., :9]))
+            q[:, j] = candidates[size.argmax(axis=1)]
+    return q
+
+
+def found_from(difference: Evaluate, interpolant: Evaluate, axes: list[Axis], starts: Array, floor: float) -> tuple[Array, Array]:
+    """Largest discrepancies found by climbing from the best of some configurations, checked on the engines themselves.
+
+    starts: (S, n). Frames whose discrepancy is below `floor` (rounding) are not climbed. Returns position [m] and rotation
+    [rad], (F,).
+    """
+    D = difference(starts)
+    F = D.shape[1]
+    sizes = np.stack([_norm(D[:, :, 3]), _norm(D[:, :, :3].reshape(len(D), F, 9))])
+    best, index = sizes.max(axis=1), sizes.argmax(axis=1)
+    parts, frames = np.nonzero(best > floor)
+    q = ascend(interpolant, axes, starts[index[parts, frames]], frames, parts)
+    if len(q):
+        top = difference(q)[np.arange(len(q)), frames]
+        reached = np.where(parts == 0, _norm(top[:, 3]), _norm(top[:, :3].reshape(len(q), 9)))
+        np.maximum.at(best, (parts, frames), reached)
+    return best[0], chord_angle(best[1])
+
+
+def _norm(v: Array) -> Array:
+    return np.asarray(np.linalg.norm(v, axis=-1))

@@ -1,0 +1,242 @@
+"""Certifies every source of a run against its reference: which polynomial each joint makes, on a grid or link by link."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+
+from harness.analysis.certify import Bounds, Evaluate, Sampled, certify, found_from, rounding_of, sample
+from harness.analysis.components import components, mapped
+from harness.analysis.interpolation import Axis, grid, weights
+from harness.analysis.links import Link, SampledLinks, certify_links, sample_links
+from harness.description.model import RobotModel
+from harness.results import Certified, Results
+from harness.se3 import Array
+from harness.sources import Bound, Participant
+
+GRID_LIMIT = 4096
+LARGEST_DENOMINATOR = 12
+
+
+class UncertifiableError(Exception):
+    """Why no certificate can exist for a model; its text is shown in the report."""
+
+
+def certify_all(results: Results) -> dict[str, Certified]:
+    """A certificate, or the reason why there is none, for every source that ran, by name."""
+    reference, *others = results.participants
+    running = [p for p in others if p.bound is not None]
+    if reference.bound is None or results.comparison is None:
+        return {}
+    try:
+        axes = joint_axes(results.model)
+        nodes = math.prod(axis.count for axis in axes)
+        make = _by_grid if nodes <= GRID_LIMIT else _by_links
+        return make(results, reference, running, axes)
+    except UncertifiableError as why:
+        return {p.name: Certified(reason=str(why)) for p in running}
+
+
+def joint_axes(model: RobotModel) -> list[Axis]:
+    """How the placements of every source depend on each model joint, (n,).
+
+    With q_urdf = A q + b, the degree in revolute joint j is sum_i |A_ij| over the URDF joints i on the mapped chain. A
+    fractional factor (a mimic multiplier) stretches the period. Raises UncertifiableError for a joint that both turns and
+    slides links, or a factor that is no simple fraction.
+    """
+    fixed = model.configurations.fixed_q
+    turning, sliding = _factors(model)
+    axes = []
+    for j, name in enumerate(model.table.joints):
+        if turning[j] and sliding[j]:
+            raise UncertifiableError(f"joint {name!r} turns some links and slides others: no polynomial of either kind")
+        if sliding[j]:
+            lower = min(model.configurations.lower[j], fixed[:, j].min())
+            upper = max(model.configurations.upper[j], fixed[:, j].max())
+            axes.append(Axis(False, max(map(len, sliding[j])), float(lower), float(upper)))
+            continue
+        fractions = [[Fraction(x).limit_denominator(LARGEST_DENOMINATOR) for x in side] for side in turning[j]]
+        for side, exact in zip(turning[j], fractions, strict=True):
+            if any(abs(x - y) > 1e-12 for x, y in zip(side, exact, strict=True)):
+                raise UncertifiableError(f"joint {name!r} drives a link by a factor that is no simple fraction: {side}")
+        stretch = math.lcm(*(f.denominator for side in fractions for f in side))
+        degree = max(int(sum(side) * stretch) for side in fractions)
+        axes.append(Axis(True, degree, 0.0, 2.0 * math.pi * stretch))
+    return axes
+
+
+def _factors(model: RobotModel) -> tuple[list[list[list[float]]], list[list[list[float]]]]:
+    """For each model joint, the factors with which it turns, and slides, the links of each description."""
+    n = len(model.table.joints)
+    turning: list[list[list[float]]] = [[] for _ in range(n)]
+    sliding: list[list[list[float]]] = [[] for _ in range(n)]
+    for j, name in enumerate(model.table.joints):
+        (turning if model.table.kind(name) == "revolute" else sliding)[j].append([1.0])
+    if model.urdf is None or model.urdf_joints is None or model.frames.base.urdf is None:
+        return turning, sliding
+    chain = {}
+    for frame in model.frames.frames:
+        if frame.urdf is not None:
+            chain.update({joint.name: joint for joint in model.urdf.between(model.frames.base.urdf, frame.urdf)})
+    for j in range(n):
+        for into, prismatic in ((turning, False), (sliding, True)):
+            driven = [
+                abs(float(model.urdf_joints.A[row, j]))
+                for row, name in enumerate(model.urdf_joints.names)
+                if name in chain and (chain[name].type == "prismatic") is prismatic and model.urdf_joints.A[row, j] != 0.0
+            ]
+            if driven:
+                into[j].append(driven)
+    return turning, sliding
+
+
+def _evaluate(bound: Bound) -> Evaluate:
+    """A source's mapped frames as (N, F_available, 4, 3)."""
+    return lambda q: np.ascontiguousarray(mapped(components(bound.raw(q)), bound.view).transpose(3, 0, 1, 2))
+
+
+def _rows(evaluate: Evaluate, rows: list[int]) -> Evaluate:
+    return lambda q: evaluate(q)[:, rows]
+
+
+@dataclass(frozen=True)
+class _Common:
+    """The mapped frames two sources share, and where each keeps them."""
+
+    frames: list[int]
+    rows_a: list[int]
+    rows_b: list[int]
+
+    @classmethod
+    def of(cls, a: Bound, b: Bound) -> _Common:
+        have_a, have_b = a.view.available, b.view.available
+        frames = [f for f in have_a if f in have_b]
+        return cls(frames, [have_a.index(f) for f in frames], [have_b.index(f) for f in frames])
+
+
+def _starts(results: Results, name: str) -> list[Array]:
+    """The worst configurations the run has seen for a source."""
+    if results.comparison is None:
+        return []
+    indices = {int(i) for part in (results.comparison.position, results.comparison.rotation) for i in part[name].argmax if i >= 0}
+    return [results.model.configurations.block(results.options.seed, i, i + 1) for i in sorted(indices)]
+
+
+def _attempt(participant: Participant, work: Callable[[Participant], Certified]) -> Certified:
+    """An engine that raises while being certified gets no certificate; what it has shown before stands."""
+    try:
+        return work(participant)
+    except UncertifiableError as why:
+        return Certified(reason=str(why))
+    except Exception as error:  # an engine's failure is its result
+        return Certified(reason=f"{participant.name} raised {type(error).__name__}: {error}")
+
+
+def _by_grid(results: Results, reference: Participant, others: list[Participant], axes: list[Axis]) -> dict[str, Certified]:
+    nodes = grid(axes)
+
+    def sampled(participant: Participant) -> Sampled:
+        return sample(_evaluate(_bound(participant)), axes, np.random.default_rng(results.options.seed))
+
+    base = sampled(reference)
+
+    def one(participant: Participant) -> Certified:
+        own, common = sampled(participant), _Common.of(_bound(participant), _bound(reference))
+        known = Certified("", "grid", len(nodes), own.residual, base.residual, own.limit, common.frames)
+        if reason := _refusal(own, base, participant.name, reference.name):
+            return replace(known, reason=reason)
+        a, b = replace(own, values=own.values[:, common.rows_a]), replace(base, values=base.values[:, common.rows_b])
+        D = a.values - b.values
+        flat = np.concatenate([np.abs(D[:, :, 3]).sum(axis=-1), np.abs(D[:, :, :3]).sum(axis=(-2, -1))], axis=1)
+        starts = np.concatenate([nodes[sorted(set(flat.argmax(axis=0)))], *_starts(results, participant.name)])
+        return _with_found(
+            known, certify(a, b, axes), participant, reference, axes, starts,
+            lambda q: np.tensordot(weights(axes, q), D, axes=1),
+        )  # fmt: skip
+
+    return {p.name: _attempt(p, one) for p in others}
+
+
+def _by_links(results: Results, reference: Participant, others: list[Participant], axes: list[Axis]) -> dict[str, Certified]:
+    def one(participant: Participant) -> Certified:
+        common = _Common.of(_bound(participant), _bound(reference))
+        links = chain_links(results.model, common.frames)
+        if any(math.prod(axes[j].count for j in link.joints) > GRID_LIMIT for link in links):
+            raise UncertifiableError("too many joints between two mapped frames: map the frames between them")
+        own, base = (
+            sample_links(_rows(_evaluate(_bound(p)), rows), axes, links, np.random.default_rng(results.options.seed))
+            for p, rows in ((participant, common.rows_a), (reference, common.rows_b))
+        )
+        count = sum(len(value) for value in own.values)
+        known = Certified("", "links", count, own.residual, base.residual, own.limit, common.frames)
+        if reason := _refusal(own, base, participant.name, reference.name):
+            return replace(known, reason=reason)
+        starts = np.concatenate(_starts(results, participant.name))
+        bounds = certify_links(own, base, axes, links, len(common.frames))
+        return _with_found(known, bounds, participant, reference, axes, starts, None)
+
+    return {p.name: _attempt(p, one) for p in others}
+
+
+def chain_links(model: RobotModel, frames: list[int]) -> list[Link]:
+    """The chain as links between mapped frames: each frame seen from the last one before it that fewer joints move.
+
+    `frames` are the mapped frames in use; links speak of their positions in it.
+    """
+    moving = [row.kind != "fixed" for row in model.table.rows]
+    entries = [model.frames.frames[f] for f in frames]
+    before = [sum(moving[: max(0, model.table.frames.index(e.dh) - 1)]) for e in entries]
+    links = []
+    for child, joints in enumerate(before):
+        parent = max((i for i, k in enumerate(before) if k < joints), key=lambda i: before[i], default=None)
+        own = set(range(0 if parent is None else before[parent], joints))
+        start = model.frames.base if parent is None else entries[parent]
+        links.append(Link(parent, child, tuple(sorted(own | _driving(model, start.urdf, entries[child].urdf)))))
+    return links
+
+
+def _driving(model: RobotModel, parent: str | None, child: str | None) -> set[int]:
+    """Model joints that move one URDF link relative to another, couplings and mimic followers included."""
+    if model.urdf is None or model.urdf_joints is None or parent is None or child is None:
+        return set()
+    names = {joint.name for joint in model.urdf.between(parent, child)}
+    rows = [row for row, name in enumerate(model.urdf_joints.names) if name in names]
+    return {int(j) for j in np.flatnonzero(model.urdf_joints.A[rows].any(axis=0))}
+
+
+def _bound(participant: Participant) -> Bound:
+    if participant.bound is None:
+        raise RuntimeError(f"{participant.name} is not bound")
+    return participant.bound
+
+
+def _refusal(own: Sampled | SampledLinks, base: Sampled | SampledLinks, name: str, reference: str) -> str:
+    for who, sampled in ((name, own), (reference, base)):
+        if not sampled.holds:
+            return (
+                f"{who} is not the polynomial in sines and cosines that a serial chain is: it differs from its own interpolant "
+                f"by {sampled.residual:.2g}, rounding explains {sampled.limit:.2g}"
+            )
+    return ""
+
+
+def _with_found(
+    known: Certified, bounds: Bounds, participant: Participant, reference: Participant, axes: list[Axis], starts: Array,
+    interpolant: Evaluate | None,
+) -> Certified:  # fmt: skip
+    """Add the bounds and the largest discrepancies found; a bound that is exceeded is no bound, and refused."""
+    common = _Common.of(_bound(participant), _bound(reference))
+    a, b = _evaluate(_bound(participant)), _evaluate(_bound(reference))
+
+    def difference(q: Array) -> Array:
+        return np.asarray(a(q)[:, common.rows_a] - b(q)[:, common.rows_b])
+
+    floor = 2.0 * rounding_of(len(axes), 1.0)
+    position, rotation = found_from(difference, interpolant or difference, axes, starts, floor)
+    if (position > bounds.position).any() or (rotation > bounds.rotation).any():
+        return replace(known, reason="a discrepancy above the bound was found: the premise does not hold")
+    return replace(known, bounds=bounds, position_found=position, rotation_found=rotation)
