@@ -12,11 +12,12 @@ from typing import Any
 
 import click
 from click.shell_completion import CompletionItem, get_completion_class
-from rich.console import Console
 from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as ProgressBar
 
 from harness import __version__
+from harness.cli_derive import derive_dh, export_urdf_command
+from harness.console import console
 from harness.crosscheck import Progress, crosscheck
 from harness.description.locate import default_models_dir, find_model, model_folders
 from harness.description.model import load_model
@@ -29,14 +30,6 @@ from harness.report.json_file import read_report
 from harness.report.terminal import show
 from harness.report.text import plain
 from harness.results import Options
-
-WIDTH_WHEN_PIPED = 1000
-
-
-def _console(stderr: bool = False) -> Console:
-    stream = sys.stderr if stderr else sys.stdout
-    # A pipe has no width: what is read by grep or kept in a log must not be folded at 80 columns.
-    return Console(stderr=stderr, width=None if stream.isatty() else WIDTH_WHEN_PIPED, highlight=False)
 
 
 def _robots(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
@@ -124,7 +117,7 @@ def run(
             codes.append(error.exit_code)
     write_index(out)
     if not quiet and not as_json:
-        _console().print(f"{codes.count(0)} of {len(codes)} robots agree; reports in {plain(str(out))}", markup=False)
+        console().print(f"{codes.count(0)} of {len(codes)} robots agree; reports in {plain(str(out))}", markup=False)
     return min((code for code in codes if code), default=0)
 
 
@@ -133,13 +126,13 @@ def run(
 @models_option
 def frames(robot: str, models: Path | None) -> int:
     """Show the frame tree: joint types, axes, and what each frame is mapped to."""
-    return show_frames(robot, models or default_models_dir(), _console())
+    return show_frames(robot, models or default_models_dir(), console())
 
 
 @cli.command()
 def engines() -> int:
     """Show which engines are installed, their versions, how to install the others, and their traits."""
-    return show_engines(_console())
+    return show_engines(console())
 
 
 @cli.command()
@@ -151,7 +144,7 @@ def render(report: Path, out: Path | None) -> int:
     folder = out or report.parent
     prepare(folder)
     for path in write_rendered(document, folder):
-        _console().print(plain(str(path)), markup=False)
+        console().print(plain(str(path)), markup=False)
     return 0
 
 
@@ -195,7 +188,7 @@ def _progress(name: str, silent: bool) -> Iterator[Progress]:
         BarColumn(),
         TextColumn("{task.completed}/{task.total}"),
         TimeRemainingColumn(),
-        console=_console(stderr=True),
+        console=console(stderr=True),
         transient=True,
         disable=not sys.stderr.isatty() or bool(os.environ.get("CI")) or silent,
     )
@@ -208,13 +201,17 @@ def _tell(report: Report, quiet: bool, as_json: bool) -> None:
     if as_json:
         click.echo(report.model_dump_json())
     elif not quiet:
-        console = _console()
-        show(report, console)
-        console.print()
+        out = console()
+        show(report, out)
+        out.print()
 
 
 def _complain(error: CrosscheckError) -> None:
     click.echo(f"error: {plain(str(error))}", err=True)
+
+
+cli.add_command(derive_dh)
+cli.add_command(export_urdf_command)
 
 
 def main() -> None:

@@ -51,7 +51,10 @@ def test_a_polynomial_is_its_interpolant(degree: int, seed: int) -> None:
     axis, c = Axis(False, degree, -0.5, 1.5), rng.normal(size=degree + 1)
     q = rng.uniform(-0.5, 1.5, 50)
     assert axis.weights(q) @ np.polyval(c, axis.nodes) == pytest.approx(np.polyval(c, q), abs=1e-10)
-    assert np.abs(np.polyval(c, q)).max() <= coefficient_sum([axis], np.asarray(np.polyval(c, axis.nodes))[:, None]) * (1 + 1e-12) + 1e-12
+    assert (
+        np.abs(np.polyval(c, q)).max()
+        <= coefficient_sum([axis], np.asarray(np.polyval(c, axis.nodes))[:, None]) * (1 + 1e-12) + 1e-12
+    )
     assert np.abs(axis.weights(q)).sum(axis=-1).max() <= axis.lebesgue * (1 + 1e-12)
 
 

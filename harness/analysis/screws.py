@@ -1,0 +1,135 @@
+"""What a mechanism is, whatever it came from: joint screws from n + 1 placements, and the chain they rebuild.
+
+Product of exponentials (Murray, Li & Sastry, "A Mathematical Introduction to Robotic Manipulation", section 3.2.2):
+    T(q) = exp(S_1 q_1) ... exp(S_n q_n) M,   M = T(0),   S_i = log(T(delta e_i) M^-1) / delta
+The step is finite, not infinitesimal: for a joint it is exact. Twists are linear part first, (v, omega), in the base frame.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from harness import se3
+from harness.se3 import Array
+
+# q (N, n) to the placement of one frame, (N, 4, 4).
+Chain: TypeAlias = Callable[[Array], Array]
+
+ANGLE_STEP, LENGTH_STEP = 1.0, 0.1
+
+
+@dataclass(frozen=True)
+class Screws:
+    """M: (4, 4) placement at q = 0; S: (n, 6) joint twists, linear part first [m, rad]; residual: largest entry by which
+    the rebuilt chain differs from the original at random configurations."""
+
+    M: Array
+    S: Array
+    residual: float
+
+
+def skew(w: Array) -> Array:
+    """Cross-product matrix, (3,) -> (3, 3)."""
+    return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
+
+
+def exp(S: Array, q: float) -> Array:
+    """exp(S q) for a twist S (6,), linear part first: (4, 4). Rodrigues' formula; a pure translation if omega is zero."""
+    v, w = S[:3] * q, S[3:] * q
+    T, angle = np.eye(4), float(np.linalg.norm(w))
+    if angle < 1e-12:
+        T[:3, 3] = v
+        T[:3, :3] += skew(w)
+        return T
+    K = skew(w / angle)
+    s, c = math.sin(angle), 1.0 - math.cos(angle)
+    T[:3, :3] += s * K + c * K @ K
+    T[:3, 3] = (np.eye(3) + c / angle * K + (1.0 - s / angle) * K @ K) @ v
+    return T
+
+
+def log(T: Array) -> Array:
+    """Twist (6,) with exp(log(T)) = T, for rotations below pi; linear part first."""
+    R, p = T[:3, :3], T[:3, 3]
+    vector = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2.0
+    s, c = float(np.linalg.norm(vector)), (np.trace(R) - 1.0) / 2.0
+    angle = math.atan2(s, c)
+    if angle < 1e-12:
+        return np.concatenate([p, vector])
+    axis = vector / s if s > 1e-9 else np.zeros(3)
+    K = skew(axis)
+    half = angle / 2.0
+    V_inverse = np.eye(3) - half * K + (1.0 - half / math.tan(half)) * K @ K
+    return np.concatenate([V_inverse @ p, axis * angle])
+
+
+def screws(chain: Chain, prismatic: list[bool], rng: np.random.Generator) -> Screws:
+    """Joint screws of a chain of which only placements are known, and how well they rebuild it.
+
+    prismatic: which joints slide (their step is 0.1 m, else 1 rad).
+    """
+    n = len(prismatic)
+    steps = np.where(prismatic, LENGTH_STEP, ANGLE_STEP)
+    T = chain(np.concatenate([np.zeros((1, n)), np.diag(steps)]))
+    M, M_inverse = T[0], se3.inverse(T[0])
+    S = np.array([log(T[i + 1] @ M_inverse) / steps[i] for i in range(n)]).reshape(n, 6)
+    q = rng.uniform(-3.0, 3.0, (16, n)) * np.where(prismatic, 0.2, 1.0)
+    rebuilt = np.array([rebuild(M, S, q_k) for q_k in q])
+    return Screws(M, S, float(np.abs(rebuilt - chain(q)).max(initial=0.0)))
+
+
+def rebuild(M: Array, S: Array, q: Array) -> Array:
+    """exp(S_1 q_1) ... exp(S_n q_n) M, (4, 4)."""
+    T = np.eye(4)
+    for twist, value in zip(S, q, strict=True):
+        T = T @ exp(twist, float(value))
+    return T @ M
+
+
+@dataclass(frozen=True)
+class Gauge:
+    """T_b_a: the one transform with S_b = Ad(T_b_a) S_a; residuals: (n, 6) what it leaves; rank: (rotation, translation)
+    directions that the axes determine, (3, 3) if there is no freedom; free: in words, what they leave open."""
+
+    T_b_a: Array
+    residuals: Array
+    rank: tuple[int, int]
+    free: tuple[str, ...]
+
+
+def adjoint(T: Array) -> Array:
+    """Ad_T for twists with the linear part first, (6, 6): [[R, [p] R], [0, R]]."""
+    A = np.zeros((6, 6))
+    R = T[:3, :3]
+    A[:3, :3] = A[3:, 3:] = R
+    A[:3, 3:] = skew(T[:3, 3]) @ R
+    return A
+
+
+def fit_gauge(S_a: Array, S_b: Array) -> Gauge:
+    """The base transform that carries one set of screws to another, by Kabsch on the directions and least squares on points.
+
+    Directions are the axes of revolute and the travel of prismatic joints (Kabsch 1976, doi:10.1107/S0567739476001873).
+    """
+    directions = [np.where(np.linalg.norm(S[:, 3:], axis=1, keepdims=True) > 1e-9, S[:, 3:], S[:, :3]) for S in (S_a, S_b)]
+    U, sizes, Vt = np.linalg.svd(directions[1].T @ directions[0])
+    R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+    # v_b - R v_a = t x (R w_a) = -[R w_a] t, for every revolute joint.
+    turned = S_a[:, 3:] @ R.T
+    rows = np.concatenate([-skew(w) for w in turned]) if len(turned) else np.zeros((0, 3))
+    right = (S_b[:, :3] - S_a[:, :3] @ R.T).ravel()
+    t, _, rank, _ = np.linalg.lstsq(rows, right, rcond=1e-9)
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = R, t
+    rotation_rank = 3 if int((sizes > 1e-9 * max(sizes[0], 1e-300)).sum()) >= 2 else 1
+    free = []
+    if rotation_rank < 3:
+        free.append("rotation about the one direction that all axes share")
+    if rank < 3:
+        free.append("translation along the one direction that all axes share" if rank == 2 else "translation")
+    return Gauge(T, S_b - S_a @ adjoint(T).T, (rotation_rank, int(rank)), tuple(free))
