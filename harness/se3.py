@@ -52,12 +52,17 @@ def from_xyz_rpy(xyz: Sequence[float], rpy: Sequence[float]) -> Array:
 
 
 def to_rpy(T: Array) -> tuple[float, float, float]:
-    """Roll, pitch, yaw [rad] of one transform; at pitch = +-pi/2 roll is set to zero (only their sum is defined)."""
+    """Roll, pitch, yaw [rad] of one transform, accurate also next to pitch = +-pi/2, where yaw is set to zero.
+
+    There only roll -+ yaw is defined: roll is taken from what yaw has left, so that an error of yaw cancels.
+    """
     R = T[:3, :3]
-    pitch = math.atan2(-R[2, 0], math.hypot(R[0, 0], R[1, 0]))
-    if math.hypot(R[0, 0], R[1, 0]) < 1e-12:
-        return 0.0, pitch, math.atan2(-R[0, 1], R[1, 1])
-    return math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0])
+    level = math.hypot(R[0, 0], R[1, 0])
+    yaw = math.atan2(R[1, 0], R[0, 0]) if level > 1e-11 else 0.0
+    s, c = math.sin(yaw), math.cos(yaw)
+    pitch = math.atan2(-R[2, 0], level)
+    roll = math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
+    return roll, pitch, yaw
 
 
 def inverse(T: Array) -> Array:

@@ -16,7 +16,7 @@ from harness.description.tidy import angle_text, is_identity, number_text, trans
 from harness.errors import InputError
 from harness.se3 import Array
 
-TOLERANCE = 1e-9
+POSITION_TOLERANCE, ROTATION_TOLERANCE = 1e-9, 1e-8
 
 
 def dh_csv(table: DHTable) -> str:
@@ -73,7 +73,7 @@ def _model_toml(derived: Derived, name: str, source: str) -> str:
         f"document = {_quoted(f'derived from {derived.urdf.path.name} as {source} places it')}\n"
         f"note = {_quoted(f'fixed by choice: {free}')}\n\n"
         f"[urdf]\nfile = {_quoted(f'{name}.urdf')}\n\n"
-        f"[tolerance]\nposition = {TOLERANCE:g}\nrotation = {TOLERANCE:g}\n"
+        f"[tolerance]\nposition = {POSITION_TOLERANCE:g}\nrotation = {ROTATION_TOLERANCE:g}\n"
         f"{_table('base', table.base)}{_table('tool', table.tool)}"
         f"\n[[source]]\nname = {_quoted(source)}\n"
     )
