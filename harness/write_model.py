@@ -84,10 +84,10 @@ def _frames_toml(derived: Derived) -> str:
     base_label = "base" if not is_identity(derived.table.base) else "0"
     taken = {base_label, "base"}
     entries = [f"[[frame]]\nname = {_quoted(derived.base)}\ndh = {_quoted(base_label)}\nurdf = {_quoted(derived.base)}\n"]
-    if base_label == "base":
-        entries.append('[[frame]]\nname = "dh frame 0"\ndh = 0\n')
+    mapped = {base_label}
     for link in derived.links:
         label = base_label if link.dh == "base" else link.dh
+        mapped.add(label)
         entry = f"[[frame]]\nname = {_quoted(link.name)}\ndh = {_quoted(label)}\nurdf = {_quoted(link.name)}\n"
         offset = transform_toml(link.offset)
         if not offset and label in taken:
@@ -95,6 +95,9 @@ def _frames_toml(derived: Derived) -> str:
         if not offset:
             taken.add(label)
         entries.append(entry + "".join(f"{k} = {v}\n" for k, v in offset.items()))
+    # A DH frame that no link rides on, frame n in front of a tool for one, is still compared among DH sources.
+    bare = [label for label in derived.table.frames if label.isdigit() and label not in mapped]
+    entries += [f'[[frame]]\nname = "dh frame {label}"\ndh = {label}\n' for label in bare]
     return "\n".join(entries)
 
 

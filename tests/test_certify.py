@@ -337,3 +337,22 @@ def test_long_chains_go_link_by_link(models: dict[str, RobotModel], monkeypatch:
     assert proof.nodes < 60
     for bound in proof.frames:
         assert bound.position_found <= bound.position_upper < 1e-8
+
+
+def test_a_mimic_follower_on_the_chain(copy_model: Callable[..., Path]) -> None:
+    """The wrist turns by -2 times the elbow, which no DH row does: a disagreement, but one with a proven bound."""
+    mimic = '<mimic joint="elbow_flex" multiplier="-2" offset="0.1"/>'
+    folder = copy_model("humanoid_arm", ("dh.csv", "wrist_flex,revolute", "wrist_flex,fixed"))
+    urdf = folder.parent.parent / "urdf" / "humanoid_arm.urdf"
+    head, tail = urdf.read_text().split('<joint name="wrist_flex"')
+    urdf.write_text(head + '<joint name="wrist_flex"' + tail.replace("<axis", f"{mimic}<axis", 1))
+    (folder / "configurations.toml").write_text("")
+    model = load_model(folder)
+    assert [axis.degree for axis in joint_axes(model)] == [1, 1, 3]
+    report = crosscheck(model, Options(300, 0, ("urdf:pinocchio", "urdf:yourdfpy")))
+    assert report.verdict.exit_code == 1
+    for name in ("urdf:pinocchio", "urdf:yourdfpy"):  # one is passed the follower's value, the other moves it itself
+        proof = certificate(report, name)
+        assert proof.status == "certified"
+        tip = proof.frames[-1]
+        assert 0.1 < tip.position_found <= tip.position_upper < 4 * tip.position_found

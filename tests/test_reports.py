@@ -85,6 +85,10 @@ def test_html_says_what_the_document_says(reports: dict[str, Report], robot: str
         assert expected in text
     headings = [h.text for h in page.iter("h2")]
     assert headings[:3] == ["For which configurations", "Who disagrees", "Where"]
+    assert "For all configurations" in [h.text for h in page.iter("h3")]
+    proof = report.sources[2].certificate
+    assert proof is not None
+    assert all(f"≤ {metres(bound.position_upper)}" in text for bound in proof.frames)
     assert not list(page.iter("script", "link", "img", "iframe"))
     assert "http" not in "".join(page.xpath("//@src | //@href"))
 
@@ -93,7 +97,7 @@ def test_html_of_a_disagreement_locates_it(disagreeing: Report) -> None:
     text = " ".join(lxml_html.fromstring(render_html(disagreeing)).text_content().split())
     assert "ur5 DISAGREES: urdf:pinocchio" in text
     assert "urdf:pinocchio, smallest reproducer" in text
-    assert "0.301 mm" in text
+    assert "≤ 0.301 mm" in text
     assert "filed as 'holds' and was found 'wrong'" in text
 
 
