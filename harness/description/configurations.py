@@ -90,8 +90,8 @@ class ConfigurationSet:
     def lattice(self) -> Array:
         """1021 configurations spread evenly: whole turns for revolute joints, the range for prismatic ones, (1021, n).
 
-        A rank-1 lattice (Korobov 1959): the mean over it is the mean over all configurations, exactly, for every
-        trigonometric polynomial of total degree up to 6 in up to 7 joints. The generator was found by trying all.
+        A rank-1 lattice (Korobov 1959): the mean over it is the mean over all configurations, exactly, for every harmonic
+        of degree at most 2 in each joint and 6 in all, in up to 7 joints. The generator was found by trying all.
         """
         steps = np.array([pow(LATTICE_GENERATOR, j, LATTICE_POINTS) for j in range(len(self.lower))])
         unit = (np.arange(LATTICE_POINTS)[:, None] * steps % LATTICE_POINTS) / LATTICE_POINTS
