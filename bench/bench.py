@@ -22,7 +22,7 @@ import torch
 import harness.crosscheck
 from harness.analysis.interpolation import Axis, grid
 from harness.analysis.links import Link, certify_links, sample_links
-from harness.certificates import certify_all, joint_axes
+from harness.certificates import certify_all
 from harness.crosscheck import crosscheck
 from harness.description.dh import DHRow, DHTable
 from harness.description.locate import default_models_dir, find_model
@@ -30,6 +30,7 @@ from harness.description.model import RobotModel, load_model
 from harness.engines.dh_numpy import DHNumpy
 from harness.engines.dh_pinocchio import DHPinocchio
 from harness.engines.registry import load_engine
+from harness.joint_axes import joint_axes
 from harness.results import Certified, Options, Results
 from harness.sources import bind
 

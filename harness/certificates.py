@@ -1,29 +1,24 @@
-"""Certifies every source of a run against its reference: which polynomial each joint makes, on a grid or link by link."""
+"""Certifies every source of a run against its reference, on a grid or link by link."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from fractions import Fraction
 
 import numpy as np
 
-from harness.analysis.certify import Bounds, Evaluate, Sampled, certify, found_from, rounding_of, sample
+from harness.analysis.certify import Bounds, Evaluate, Sampled, certify, found_from, rounding_of, sample, tighter
 from harness.analysis.components import components, mapped
 from harness.analysis.interpolation import Axis, grid, weights
 from harness.analysis.links import Link, SampledLinks, certify_links, sample_links
 from harness.description.model import RobotModel
+from harness.joint_axes import UncertifiableError, joint_axes
 from harness.results import Certified, Results
 from harness.se3 import Array
 from harness.sources import Bound, Participant
 
 GRID_LIMIT = 4096
-LARGEST_DENOMINATOR = 12
-
-
-class UncertifiableError(Exception):
-    """Why no certificate can exist for a model; its text is shown in the report."""
 
 
 def certify_all(results: Results) -> dict[str, Certified]:
@@ -39,59 +34,6 @@ def certify_all(results: Results) -> dict[str, Certified]:
         return make(results, reference, running, axes)
     except UncertifiableError as why:
         return {p.name: Certified(reason=str(why)) for p in running}
-
-
-def joint_axes(model: RobotModel) -> list[Axis]:
-    """How the placements of every source depend on each model joint, (n,).
-
-    With q_urdf = A q + b, the degree in revolute joint j is sum_i |A_ij| over the URDF joints i on the mapped chain. A
-    fractional factor (a mimic multiplier) stretches the period. Raises UncertifiableError for a joint that both turns and
-    slides links, or a factor that is no simple fraction.
-    """
-    fixed = model.configurations.fixed_q
-    turning, sliding = _factors(model)
-    axes = []
-    for j, name in enumerate(model.table.joints):
-        if turning[j] and sliding[j]:
-            raise UncertifiableError(f"joint {name!r} turns some links and slides others: no polynomial of either kind")
-        if sliding[j]:
-            lower = min(model.configurations.lower[j], fixed[:, j].min())
-            upper = max(model.configurations.upper[j], fixed[:, j].max())
-            axes.append(Axis(False, max(map(len, sliding[j])), float(lower), float(upper)))
-            continue
-        fractions = [[Fraction(x).limit_denominator(LARGEST_DENOMINATOR) for x in side] for side in turning[j]]
-        for side, exact in zip(turning[j], fractions, strict=True):
-            if any(abs(x - y) > 1e-12 for x, y in zip(side, exact, strict=True)):
-                raise UncertifiableError(f"joint {name!r} drives a link by a factor that is no simple fraction: {side}")
-        stretch = math.lcm(*(f.denominator for side in fractions for f in side))
-        degree = max(int(sum(side) * stretch) for side in fractions)
-        axes.append(Axis(True, degree, 0.0, 2.0 * math.pi * stretch))
-    return axes
-
-
-def _factors(model: RobotModel) -> tuple[list[list[list[float]]], list[list[list[float]]]]:
-    """For each model joint, the factors with which it turns, and slides, the links of each description."""
-    n = len(model.table.joints)
-    turning: list[list[list[float]]] = [[] for _ in range(n)]
-    sliding: list[list[list[float]]] = [[] for _ in range(n)]
-    for j, name in enumerate(model.table.joints):
-        (turning if model.table.kind(name) == "revolute" else sliding)[j].append([1.0])
-    if model.urdf is None or model.urdf_joints is None or model.frames.base.urdf is None:
-        return turning, sliding
-    chain = {}
-    for frame in model.frames.frames:
-        if frame.urdf is not None:
-            chain.update({joint.name: joint for joint in model.urdf.between(model.frames.base.urdf, frame.urdf)})
-    for j in range(n):
-        for into, prismatic in ((turning, False), (sliding, True)):
-            driven = [
-                abs(float(model.urdf_joints.A[row, j]))
-                for row, name in enumerate(model.urdf_joints.names)
-                if name in chain and (chain[name].type == "prismatic") is prismatic and model.urdf_joints.A[row, j] != 0.0
-            ]
-            if driven:
-                into[j].append(driven)
-    return turning, sliding
 
 
 def _evaluate(bound: Bound) -> Evaluate:
@@ -142,7 +84,11 @@ def _by_grid(results: Results, reference: Participant, others: list[Participant]
     def sampled(participant: Participant) -> Sampled:
         return sample(_evaluate(_bound(participant)), axes, np.random.default_rng(results.options.seed))
 
-    base = sampled(reference)
+    try:
+        base = sampled(reference)
+    except Exception as error:  # an engine's failure is its result
+        why = f"{reference.name} raised {type(error).__name__}: {error}"
+        return {p.name: Certified(reason=why) for p in others}
 
     def one(participant: Participant) -> Certified:
         own, common = sampled(participant), _Common.of(_bound(participant), _bound(reference))
@@ -153,8 +99,12 @@ def _by_grid(results: Results, reference: Participant, others: list[Participant]
         D = a.values - b.values
         flat = np.concatenate([np.abs(D[:, :, 3]).sum(axis=-1), np.abs(D[:, :, :3]).sum(axis=(-2, -1))], axis=1)
         starts = np.concatenate([nodes[sorted(set(flat.argmax(axis=0)))], *_starts(results, participant.name)])
+        bounds = certify(a, b, axes)
+        own_links, base_links, by_links = _link_bounds(results, participant, reference, axes, common)
+        if own_links.holds and base_links.holds:
+            bounds = tighter(bounds, by_links)
         return _with_found(
-            known, certify(a, b, axes), participant, reference, axes, starts,
+            known, bounds, participant, reference, axes, starts,
             lambda q: np.tensordot(weights(axes, q), D, axes=1),
         )  # fmt: skip
 
@@ -164,22 +114,29 @@ def _by_grid(results: Results, reference: Participant, others: list[Participant]
 def _by_links(results: Results, reference: Participant, others: list[Participant], axes: list[Axis]) -> dict[str, Certified]:
     def one(participant: Participant) -> Certified:
         common = _Common.of(_bound(participant), _bound(reference))
-        links = chain_links(results.model, common.frames)
-        if any(math.prod(axes[j].count for j in link.joints) > GRID_LIMIT for link in links):
-            raise UncertifiableError("too many joints between two mapped frames: map the frames between them")
-        own, base = (
-            sample_links(_rows(_evaluate(_bound(p)), rows), axes, links, np.random.default_rng(results.options.seed))
-            for p, rows in ((participant, common.rows_a), (reference, common.rows_b))
-        )
+        own, base, bounds = _link_bounds(results, participant, reference, axes, common)
         count = sum(len(value) for value in own.values)
         known = Certified("", "links", count, own.residual, base.residual, own.limit, common.frames)
         if reason := _refusal(own, base, participant.name, reference.name):
             return replace(known, reason=reason)
         starts = np.concatenate(_starts(results, participant.name))
-        bounds = certify_links(own, base, axes, links, len(common.frames))
         return _with_found(known, bounds, participant, reference, axes, starts, None)
 
     return {p.name: _attempt(p, one) for p in others}
+
+
+def _link_bounds(
+    results: Results, participant: Participant, reference: Participant, axes: list[Axis], common: _Common
+) -> tuple[SampledLinks, SampledLinks, Bounds]:
+    """Both sources link by link, and the bounds that follow if the premise holds for both."""
+    links = chain_links(results.model, common.frames)
+    if any(math.prod(axes[j].count for j in link.joints) > GRID_LIMIT for link in links):
+        raise UncertifiableError("too many joints between two mapped frames: map the frames between them")
+    own, base = (
+        sample_links(_rows(_evaluate(_bound(p)), rows), axes, links, np.random.default_rng(results.options.seed))
+        for p, rows in ((participant, common.rows_a), (reference, common.rows_b))
+    )
+    return own, base, certify_links(own, base, axes, links, len(common.frames))
 
 
 def chain_links(model: RobotModel, frames: list[int]) -> list[Link]:
@@ -237,6 +194,6 @@ def _with_found(
 
     floor = 2.0 * rounding_of(len(axes), 1.0)
     position, rotation = found_from(difference, interpolant or difference, axes, starts, floor)
-    if (position > bounds.position).any() or (rotation > bounds.rotation).any():
+    if not ((position <= bounds.position).all() and (rotation <= bounds.rotation).all()):  # also if one is no number
         return replace(known, reason="a discrepancy above the bound was found: the premise does not hold")
     return replace(known, bounds=bounds, position_found=position, rotation_found=rotation)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from harness.analysis.certify import Evaluate, ascend, certify, chord_angle, found_from, lebesgue, sample
 from harness.analysis.interpolation import Axis, coefficient_sum, grid, weights
 from harness.analysis.links import Link, certify_links, sample_links
-from harness.certificates import UncertifiableError, chain_links, joint_axes
+from harness.certificates import chain_links
 from harness.crosscheck import crosscheck
 from harness.description.dh import DHRow, DHTable
 from harness.description.model import RobotModel, load_model
@@ -22,6 +22,7 @@ from harness.engines import registry
 from harness.engines.base import Engine
 from harness.engines.dh_numpy import DHNumpy
 from harness.engines.registry import Registered
+from harness.joint_axes import UncertifiableError, joint_axes
 from harness.report.document import Certificate, Report
 from harness.results import Options
 from harness.se3 import Array
@@ -251,10 +252,35 @@ class Raises(Fake):
         return super()._placements(q, frames)
 
 
-@pytest.mark.parametrize("adapter", [Clamped, Stale, Coupled, WrappedWrongly, Degrees, Nan, Raises])
+class ClampedFarOut(Fake):
+    def _placements(self, q: Array, frames: Sequence[str]) -> Array:
+        return super()._placements(np.clip(q, -3 * math.pi, 3 * math.pi), frames)
+
+
+class Infinite(Fake):
+    def _placements(self, q: Array, frames: Sequence[str]) -> Array:
+        T = super()._placements(q, frames)
+        T[np.abs(q[:, 0]) > 3.5, :, 0, 3] = np.inf
+        return T
+
+
+class NanInRotation(Fake):
+    def _placements(self, q: Array, frames: Sequence[str]) -> Array:
+        T = super()._placements(q, frames)
+        T[np.abs(q[:, 0]) > 4.5, :, 0, 0] = np.nan
+        return T
+
+
+BROKEN = [Clamped, ClampedFarOut, Stale, Coupled, WrappedWrongly, Degrees, Nan, NanInRotation, Infinite, Raises]
+
+
+@pytest.mark.parametrize("limit", [4096, 10])
+@pytest.mark.parametrize("adapter", BROKEN)
 def test_a_broken_premise_is_refused(
-    models: dict[str, RobotModel], monkeypatch: pytest.MonkeyPatch, adapter: type[Engine]
+    models: dict[str, RobotModel], monkeypatch: pytest.MonkeyPatch, adapter: type[Engine], limit: int
 ) -> None:
+    """On the grid, and link by link."""
+    monkeypatch.setattr("harness.certificates.GRID_LIMIT", limit)
     known = {**registry.registered(), "dh:fake": Registered("dh:fake", adapter)}
     monkeypatch.setattr(registry, "registered", lambda: known)
     report = crosscheck(models["stanford"], Options(20, 0, ("dh:fake", "dh:pinocchio")))
@@ -264,6 +290,28 @@ def test_a_broken_premise_is_refused(
     assert "dh:fake" in proof.reason
     assert certificate(report, "dh:pinocchio").status == "certified"
     assert "for all configurations" not in report.verdict.sentence
+
+
+@pytest.mark.parametrize("adapter", [Raises, Clamped])
+def test_a_reference_that_breaks_the_premise_ends_no_run(
+    models: dict[str, RobotModel], monkeypatch: pytest.MonkeyPatch, adapter: type[Engine]
+) -> None:
+    known = {**registry.registered(), "dh:fake": Registered("dh:fake", adapter)}
+    monkeypatch.setattr(registry, "registered", lambda: known)
+    report = crosscheck(models["stanford"], Options(20, 0, ("dh:numpy",), reference="dh:fake"))
+    proof = certificate(report, "dh:numpy")
+    assert proof.status == "refused"
+    assert "dh:fake" in proof.reason
+
+
+def test_the_smaller_of_both_forms_counts(models: dict[str, RobotModel], monkeypatch: pytest.MonkeyPatch) -> None:
+    both = certificate(crosscheck(models["ur5e"], Options(20, 0, FAST)), "urdf:pinocchio")
+    monkeypatch.setattr("harness.certificates.GRID_LIMIT", 10)
+    links = certificate(crosscheck(models["ur5e"], Options(20, 0, FAST)), "urdf:pinocchio")
+    assert (both.form, links.form) == ("grid", "links")
+    for a, b in zip(both.frames, links.frames, strict=True):
+        assert a.position_upper <= b.position_upper
+        assert a.rotation_upper <= b.rotation_upper
 
 
 def test_an_engine_that_clamps_agrees_within_limits_but_not_at_the_gate(

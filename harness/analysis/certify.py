@@ -43,8 +43,8 @@ class Sampled:
 
     @property
     def holds(self) -> bool:
-        """Whether the premise holds; never for NaN."""
-        return self.residual <= self.limit
+        """Whether the premise holds; never for what is not finite."""
+        return within(self.residual, self.limit)
 
 
 @dataclass(frozen=True)
@@ -70,20 +70,35 @@ def lebesgue(axes: list[Axis]) -> float:
     return math.prod(axis.lebesgue for axis in axes)
 
 
-def sample(evaluate: Evaluate, axes: list[Axis], rng: np.random.Generator) -> Sampled:
-    """Evaluate an engine on the grid, and test the premise at random configurations over two whole turns and more.
+def probes(axes: list[Axis], rng: np.random.Generator) -> Array:
+    """Random configurations to test the premise at, (64, n): four whole turns around the grid, or the prismatic range.
 
     Outside every joint limit on purpose: an engine that clamps or wraps there is no longer such a polynomial.
     """
+    lower, upper = (np.array([getattr(axis, end) for axis in axes]) for end in ("lower", "upper"))
+    beyond = 1.5 * (upper - lower) * np.array([axis.periodic for axis in axes])
+    return np.asarray(rng.uniform(lower - beyond, upper + beyond, (TESTS, len(axes))))
+
+
+def largest(entries: Array) -> float:
+    """Largest modulus, infinity if any entry is not a number."""
+    worst = float(np.abs(entries).max(initial=0.0))
+    return worst if math.isfinite(worst) else math.inf
+
+
+def within(residual: float, limit: float) -> bool:
+    """Whether a premise holds: a finite limit, and a residual that is not above it."""
+    return math.isfinite(limit) and residual <= limit
+
+
+def sample(evaluate: Evaluate, axes: list[Axis], rng: np.random.Generator) -> Sampled:
+    """Evaluate an engine on the grid, and test the premise at random configurations."""
     values = evaluate(grid(axes))
-    spread = np.array([(axis.upper - axis.lower) for axis in axes])
-    middle = np.array([(axis.upper + axis.lower) / 2 for axis in axes])
-    wide = np.array([1.0 if axis.periodic else 0.5 for axis in axes])
-    q = middle + rng.uniform(-1.0, 1.0, (TESTS, len(axes))) * spread * wide
+    q = probes(axes, rng)
     with np.errstate(invalid="ignore", over="ignore"):
         predicted = np.tensordot(weights(axes, q), values, axes=1)
-        residual = float(np.abs(evaluate(q) - predicted).max(initial=0.0))
-        reach = float(np.linalg.norm(values[:, :, 3], axis=-1).max(initial=0.0))
+        residual = largest(evaluate(q) - predicted)
+        reach = largest(np.linalg.norm(values[:, :, 3], axis=-1))
     rounding = rounding_of(len(axes), reach)
     return Sampled(values, residual, (1.0 + lebesgue(axes)) * rounding, rounding)
 
@@ -103,6 +118,12 @@ def certify(a: Sampled, b: Sampled, axes: list[Axis]) -> Bounds:
         bounds.append(np.minimum(kernel, coefficients) + math.sqrt(entries) * allowance)
         methods.append(np.where(coefficients <= kernel, "coefficients", "kernel"))
     return Bounds(bounds[0], chord_angle(bounds[1]), tuple(str(m) for m in methods[0]))
+
+
+def tighter(a: Bounds, b: Bounds) -> Bounds:
+    """The smaller of two bounds, frame by frame: both hold."""
+    method = tuple(m if x <= y else n for x, y, m, n in zip(a.position, b.position, a.method, b.method, strict=True))
+    return Bounds(np.minimum(a.position, b.position), np.minimum(a.rotation, b.rotation), method)
 
 
 def chord_angle(chord: Array) -> Array:

@@ -13,7 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.analysis.certify import TESTS, Bounds, Evaluate, chord_angle, lebesgue, rounding_of
+from harness.analysis.certify import (
+    Bounds,
+    Evaluate,
+    chord_angle,
+    largest,
+    lebesgue,
+    probes,
+    rounding_of,
+    within,
+)
 from harness.analysis.interpolation import Axis, coefficient_sum, grid, weights
 from harness.se3 import Array
 
@@ -29,17 +38,16 @@ class Link:
 
 @dataclass(frozen=True)
 class SampledLinks:
-    """One engine, link by link. values: for each link (M_link, 4, 3); residual, limit and rounding as in `Sampled`."""
+    """One engine, link by link. values: for each link (M_link, 4, 3); residual and limit as in `Sampled`."""
 
     values: tuple[Array, ...]
     residual: float
     limit: float
-    rounding: float
 
     @property
     def holds(self) -> bool:
-        """Whether the premise holds; never for NaN."""
-        return self.residual <= self.limit
+        """Whether the premise holds; never for what is not finite."""
+        return within(self.residual, self.limit)
 
 
 def sample_links(evaluate: Evaluate, axes: list[Axis], links: list[Link], rng: np.random.Generator) -> SampledLinks:
@@ -54,28 +62,25 @@ def sample_links(evaluate: Evaluate, axes: list[Axis], links: list[Link], rng: n
     ends = np.cumsum([len(block) for block in blocks])
     placed = evaluate(np.concatenate(blocks))
     values = tuple(_relative(part, link) for part, link in zip(np.split(placed, ends[:-1]), links, strict=True))
-    lower, upper = (np.array([getattr(axis, end) for axis in axes]) for end in ("lower", "upper"))
-    q = rng.uniform(lower - (upper - lower) * [axis.periodic for axis in axes], upper, (TESTS, len(axes)))
+    q = probes(axes, rng)
     tested = evaluate(q)
-    residual, growth = 0.0, 1.0
+    residual = 0.0
+    growth = max(lebesgue([axes[j] for j in link.joints]) for link in links)
     with np.errstate(invalid="ignore", over="ignore"):
         for link, value in zip(links, values, strict=True):
-            own = [axes[j] for j in link.joints]
-            predicted = np.tensordot(weights(own, q[:, list(link.joints)]), value, axes=1)
-            residual = max(residual, float(np.abs(_relative(tested, link) - predicted).max()))
-            residual = math.inf if not np.isfinite(predicted).all() else residual
-            growth = max(growth, lebesgue(own))
-        reach = float(np.linalg.norm(tested[:, :, 3], axis=-1).max(initial=0.0))
+            predicted = np.tensordot(weights([axes[j] for j in link.joints], q[:, list(link.joints)]), value, axes=1)
+            residual = max(residual, largest(_relative(tested, link) - predicted))
+        reach = largest(np.linalg.norm(tested[:, :, 3], axis=-1))
     # Two placements, each multiplied into the other, make one link: twice the error and once more the reach.
     rounding = 4.0 * rounding_of(len(axes), reach)
-    return SampledLinks(values, residual, (1.0 + growth) * rounding, rounding)
+    return SampledLinks(values, residual, (1.0 + growth) * rounding)
 
 
 def certify_links(a: SampledLinks, b: SampledLinks, axes: list[Axis], links: list[Link], frames: int) -> Bounds:
     """Upper bounds at every frame, composed along the chain; see the module. `b` is the one whose reach is used."""
     position, chord = np.full(frames, np.inf), np.full(frames, np.inf)
     by_child = {link.child: i for i, link in enumerate(links)}
-    parts = [_link_bounds(a.values[i], b.values[i], axes, link, a.rounding + b.rounding) for i, link in enumerate(links)]
+    parts = [_link_bounds(a.values[i], b.values[i], axes, link, a.limit + b.limit) for i, link in enumerate(links)]
     for child in by_child:
         shift, turn, reach = 0.0, 0.0, 0.0
         current: int | None = child
@@ -90,7 +95,7 @@ def certify_links(a: SampledLinks, b: SampledLinks, axes: list[Axis], links: lis
     return Bounds(position, chord_angle(chord), ("links",) * frames)
 
 
-def _link_bounds(a: Array, b: Array, axes: list[Axis], link: Link, rounding: float) -> tuple[float, float, float]:
+def _link_bounds(a: Array, b: Array, axes: list[Axis], link: Link, allowance: float) -> tuple[float, float, float]:
     """Bounds over all q of one link: |dp| [m], |dR|_F, and the length |p_b| [m]."""
     own = [axes[j] for j in link.joints]
     growth, D = lebesgue(own), a - b
@@ -98,7 +103,7 @@ def _link_bounds(a: Array, b: Array, axes: list[Axis], link: Link, rounding: flo
     for part, entries in ((D[:, 3], 3), (D[:, :3].reshape(len(D), 9), 9), (b[:, 3], 3)):
         kernel = growth * float(np.linalg.norm(part, axis=-1).max())
         smaller = min(kernel, float(coefficient_sum(own, part)))
-        bounds.append(smaller + math.sqrt(entries) * (1.0 + growth) * rounding)
+        bounds.append(smaller + math.sqrt(entries) * allowance)
     return bounds[0], bounds[1], bounds[2]
 
 
