@@ -273,3 +273,32 @@ def test_export_urdf_command(cli: Cli, tmp_path: Path) -> None:
     shown = cli("frames", "sixr.urdf")
     assert shown.returncode == 0
     assert "joint4_link" in shown.stdout
+
+
+def test_a_calibrated_arm_with_nearly_parallel_axes() -> None:
+    """Factory calibration of a real UR10e: d of hundreds of metres. Named as ill-determined, and still the same mechanism."""
+    theta = [
+        -2.4147806894359e-07,
+        1.60233952386695,
+        -1.68607190752171,
+        0.0837331147700119,
+        -1.01260355871158e-07,
+        3.91986209186124e-08,
+    ]
+    a = [2.12234865571206e-05, 0.0193171326277006, -0.569251663611088, -4.61409023720934e-05, -6.39280053471802e-05, 0.0]
+    d = [0.180539811714259, 439.140974079901, -446.027059806332, 7.0603368964236, 0.119811341150314, 0.115670917257426]
+    alpha = [1.57014608044242, 0.0013941666682559, 0.00693818880325995, 1.56998468543761, -1.57038520649543, 0.0]
+    table = DHTable(tuple(DHRow(f"j{i}", "revolute", a[i], alpha[i], d[i], theta[i]) for i in range(6)))
+    found = screws(chain_of(table), [False] * 6, np.random.default_rng(0))
+    form = canonical(found, [False] * 6, "standard", list(table.joints))
+    assert [row.d for row in form.rows[1:4]] == pytest.approx(d[1:4], rel=1e-8)
+    rows = tuple(DHRow(n, "revolute", r.a, r.alpha, r.d, r.theta) for n, r in zip(table.joints, form.rows, strict=True))
+    q = np.random.default_rng(1).uniform(-3, 3, (20, 6))
+    assert_placements_close(chain_of(DHTable(rows, "standard", form.base, form.tool))(q), chain_of(table)(q), 1e-9)
+
+
+def test_nearly_parallel_axes_are_named() -> None:
+    rows = tuple(DHRow(f"j{i}", "revolute", 0.5, alpha, 0.1, 0.0) for i, alpha in enumerate((1e-5, math.pi / 2, 0.0)))
+    found = screws(chain_of(DHTable(rows)), [False] * 3, np.random.default_rng(0))
+    free = canonical(found, [False] * 3, "standard", ["j0", "j1", "j2"]).free
+    assert free == ("j0 and j1 are parallel to within 1.0e-05 rad: d is ill-determined",)
