@@ -48,6 +48,8 @@ def derive(urdf: Urdf, base: str, tip: str, convention: Convention, source: str)
 
     Raises UrdfError where no DH table exists: a floating or planar joint, a mimic follower, a joint that is no unit screw.
     """
+    if not source.startswith("urdf:"):
+        raise InputError(f"expected a source that reads a URDF, got {source!r}", key="--source")
     for option, link in (("--base", base), ("--tip", tip)):
         if link not in urdf.links:
             raise InputError(f"no link {link!r} in {urdf.path.name}; {nearest(link, urdf.links)}", key=option)

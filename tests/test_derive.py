@@ -140,12 +140,16 @@ def test_the_gauge_carries_one_chain_to_the_other(T: Array, table: DHTable) -> N
 
 
 def test_parallel_axes_leave_the_gauge_free() -> None:
+    """Three parallel axes fix the turn about them by where they stand; one alone does not."""
     planar = DHTable(tuple(DHRow(f"j{i}", "revolute", 0.5, 0.0, 0.0, 0.0) for i in range(3)))
     S = screws(chain_of(planar), [False] * 3, np.random.default_rng(0)).S
-    gauge = fit_gauge(S, S @ adjoint(se3.translation((0.1, -0.2, 0.7))).T)
-    assert gauge.rank == (1, 2)
-    assert any("translation along" in text for text in gauge.free)
-    assert gauge.T_b_a[:2, 3] == pytest.approx([0.1, -0.2], abs=1e-9)
+    T = se3.from_xyz_rpy((0.1, -0.2, 0.7), (0, 0, 0.4))
+    gauge = fit_gauge(S, S @ adjoint(T).T)
+    assert (gauge.rank, gauge.free) == ((3, 2), ("translation along the one direction that all axes share",))
+    assert_placements_close(gauge.T_b_a[:2], T[:2], 1e-9)
+    alone = fit_gauge(S[:1], S[:1] @ adjoint(T).T)
+    assert alone.rank == (2, 2)
+    assert len(alone.free) == 2
 
 
 @pytest.mark.parametrize("value", ["pi/2", "-pi", "3*pi/4", "-pi/12", "0", "0.3", "5*pi/6", "-2*pi"])
@@ -230,6 +234,8 @@ def test_derive_dh_writes_a_model_that_runs(cli: Cli, tmp_path: Path) -> None:
         (("PANDA", "--tip", "panda_linc8"), "--tip: no link 'panda_linc8'.*did you mean 'panda_link"),
         (("PANDA", "--tip", "panda_rightfinger"), "no DH table: joint 'panda_finger_joint2' mimics"),
         (("PANDA", "--tip", "panda_link8", "--source", "urdf:pinochio"), "did you mean 'urdf:pinocchio'"),
+        (("PANDA", "--tip", "panda_link8", "--source", "dh:numpy"), "--source: expected a source that reads a URDF"),
+        (("PANDA", "--tip", "panda_link8", "--out", "/proc/nowhere"), "cannot be written"),
     ],
 )
 def test_derive_dh_refuses_in_one_line(cli: Cli, args: tuple[str, ...], message: str) -> None:

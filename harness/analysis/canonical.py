@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from harness import se3
 from harness.analysis.screws import Screws
+from harness.description.dh import Convention
 from harness.se3 import Array
 
 PARALLEL = 1e-8
@@ -52,14 +52,11 @@ class _Axis:
     prismatic: bool
 
 
-def canonical(screws: Screws, prismatic: list[bool], convention: Literal["standard", "modified"], names: list[str]) -> Canonical:
+def canonical(screws: Screws, prismatic: list[bool], convention: Convention, names: list[str]) -> Canonical:
     """DH parameters of the chain. Raises ValueError if a screw is no joint's (a helical or zero twist)."""
     axes = _axes(screws, prismatic, names)
     free = [f"{name} slides: its axis may stand anywhere" for name, slides in zip(names, prismatic, strict=True) if slides]
-    if convention == "standard":
-        frames = _standard_frames(axes, screws.M, names, free)
-    else:
-        frames = _modified_frames(axes, screws.M, names, free)
+    frames = _frames(axes, screws.M, convention, names, free)
     rows = []
     for i, axis in enumerate(axes):
         A = se3.inverse(frames[i]) @ frames[i + 1]
@@ -134,7 +131,7 @@ def _normal(
     return direction, foot, other
 
 
-def _start(axis: _Axis, names: list[str]) -> Array:
+def _start(axis: _Axis) -> Array:
     """Frame 0 on the first axis: the base frame itself where it fits, else as near to it as can be."""
     origin = axis.point - (axis.point @ axis.z) * axis.z if not axis.prismatic else np.zeros(3)
     return _frame(_across(axis.z, np.array([1.0, 0.0, 0.0])), axis.z, origin)
@@ -145,41 +142,29 @@ def _shifted(axis: _Axis, near: Array) -> _Axis:
     return _Axis(axis.z, near, True) if axis.prismatic else axis
 
 
-def _standard_frames(axes: list[_Axis], M: Array, names: list[str], free: list[str]) -> list[Array]:
-    """Frames 0 ... n at q = 0: z_(i-1) along joint i's axis, x_i on the common normal of axes i and i + 1."""
-    frames = [_start(axes[0], names)]
+def _frames(axes: list[_Axis], M: Array, convention: Convention, names: list[str], free: list[str]) -> list[Array]:
+    """Frames 0 ... n at q = 0, each x on the common normal of two neighbouring axes, at its foot on one of them.
+
+    Standard: z_(i-1) along joint i's axis, frame i on axis i + 1. Modified: z_i along it, frame i on axis i.
+    """
+    frames = [_start(axes[0])]
     current = _shifted(axes[0], frames[0][:3, 3])
     for i in range(len(axes) - 1):
-        previous = frames[-1]
-        following = _shifted(axes[i + 1], previous[:3, 3])
-        x, _, origin = _normal(current, following, previous[:3, 3], previous[:3, 0], free, (names[i], names[i + 1]))
-        frames.append(_frame(x, following.z, origin))
+        near, x = frames[-1][:3, 3], frames[-1][:3, 0]
+        following = _shifted(axes[i + 1], near)
+        x, first, second = _normal(current, following, near, x, free, (names[i], names[i + 1]))
+        frames.append(_frame(x, following.z, second) if convention == "standard" else _frame(x, current.z, first))
         current = following
-    return [*frames, _last(current, M, frames[-1])]
+    return [*frames, _last(current, M, convention)]
 
 
-def _last(axis: _Axis, M: Array, previous: Array) -> Array:
+def _last(axis: _Axis, M: Array, convention: Convention) -> Array:
     """Frame n: the tip itself if a standard row can reach it, else on the last axis abreast of the tip."""
     x, p = M[:3, 0], M[:3, 3]
     foot = axis.point + ((p - axis.point) @ axis.z) * axis.z
-    if abs(x @ axis.z) < ON and np.linalg.norm(np.cross(x, p - foot)) < ON:
+    if convention == "standard" and abs(x @ axis.z) < ON and np.linalg.norm(np.cross(x, p - foot)) < ON:
         return M
     return _frame(_across(axis.z, x), axis.z, foot)
-
-
-def _modified_frames(axes: list[_Axis], M: Array, names: list[str], free: list[str]) -> list[Array]:
-    """Frames 0 ... n at q = 0: z_i along joint i's axis, x_i on the common normal of axes i and i + 1; frame 0 on axis 1."""
-    frames = [_start(axes[0], names)]
-    current = _shifted(axes[0], frames[0][:3, 3])
-    for i in range(len(axes) - 1):
-        previous = frames[-1]
-        following = _shifted(axes[i + 1], previous[:3, 3])
-        x, foot, _ = _normal(current, following, previous[:3, 3], previous[:3, 0], free, (names[i], names[i + 1]))
-        frames.append(_frame(x, current.z, foot))
-        current = following
-    p = M[:3, 3]
-    foot = current.point + ((p - current.point) @ current.z) * current.z
-    return [*frames, _frame(_across(current.z, M[:3, 0]), current.z, foot)]
 
 
 def _standard_row(A: Array, prismatic: bool) -> CanonicalRow:

@@ -93,8 +93,8 @@ def rebuild(M: Array, S: Array, q: Array) -> Array:
 
 @dataclass(frozen=True)
 class Gauge:
-    """T_b_a: the one transform with S_b = Ad(T_b_a) S_a; residuals: (n, 6) what it leaves; rank: (rotation, translation)
-    directions that the axes determine, (3, 3) if there is no freedom; free: in words, what they leave open."""
+    """T_b_a: the one transform with S_b = Ad(T_b_a) S_a; residuals: (n, 6) what it leaves; rank: how many
+    directions of rotation and of translation the axes determine, (3, 3) if all; free: in words, what they leave open."""
 
     T_b_a: Array
     residuals: Array
@@ -114,22 +114,43 @@ def adjoint(T: Array) -> Array:
 def fit_gauge(S_a: Array, S_b: Array) -> Gauge:
     """The base transform that carries one set of screws to another, by Kabsch on the directions and least squares on points.
 
-    Directions are the axes of revolute and the travel of prismatic joints (Kabsch 1976, doi:10.1107/S0567739476001873).
+    Directions are the axes of revolute and the travel of prismatic joints (Kabsch 1976, doi:10.1107/S0567739476001873). If
+    all are parallel, the turn about them follows from where the revolute axes stand.
     """
-    directions = [np.where(np.linalg.norm(S[:, 3:], axis=1, keepdims=True) > 1e-9, S[:, 3:], S[:, :3]) for S in (S_a, S_b)]
+    revolute = np.linalg.norm(S_a[:, 3:], axis=1) > 1e-9
+    directions = [np.where(revolute[:, None], S[:, 3:], S[:, :3]) for S in (S_a, S_b)]
     U, sizes, Vt = np.linalg.svd(directions[1].T @ directions[0])
-    R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+    R = np.asarray(U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt)
+    free = []
+    if sizes[1] <= 1e-9 * sizes[0]:
+        z = directions[1][0] / np.linalg.norm(directions[1][0])
+        turn = _turn_about(z, _points(S_a[revolute]) @ R.T, _points(S_b[revolute]))
+        if turn is None:
+            free.append("rotation about the one direction that all axes share")
+        else:
+            R = exp(np.concatenate([np.zeros(3), z]), turn)[:3, :3] @ R
     # v_b - R v_a = t x (R w_a) = -[R w_a] t, for every revolute joint.
-    turned = S_a[:, 3:] @ R.T
-    rows = np.concatenate([-skew(w) for w in turned]) if len(turned) else np.zeros((0, 3))
+    rows = np.concatenate([-skew(w) for w in S_a[:, 3:] @ R.T])
     right = (S_b[:, :3] - S_a[:, :3] @ R.T).ravel()
     t, _, rank, _ = np.linalg.lstsq(rows, right, rcond=1e-9)
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = R, t
-    rotation_rank = 3 if int((sizes > 1e-9 * max(sizes[0], 1e-300)).sum()) >= 2 else 1
-    free = []
-    if rotation_rank < 3:
-        free.append("rotation about the one direction that all axes share")
     if rank < 3:
         free.append("translation along the one direction that all axes share" if rank == 2 else "translation")
-    return Gauge(T, S_b - S_a @ adjoint(T).T, (rotation_rank, int(rank)), tuple(free))
+    turns = 2 if any("rotation" in text for text in free) else 3
+    return Gauge(T, S_b - S_a @ adjoint(T).T, (turns, int(rank)), tuple(free))
+
+
+def _points(S: Array) -> Array:
+    """A point on the axis of each revolute twist, (n, 3)."""
+    return np.asarray(np.cross(S[:, 3:], S[:, :3]) / (S[:, 3:] ** 2).sum(axis=1, keepdims=True))
+
+
+def _turn_about(z: Array, a: Array, b: Array) -> float | None:
+    """Angle about z that turns points a onto points b, both seen along z and from their middle; None if they are one point."""
+    if len(a) < 2:
+        return None
+    a, b = (p - np.outer(p @ z, z) for p in (a - a.mean(axis=0), b - b.mean(axis=0)))
+    if np.linalg.norm(a) < 1e-9:
+        return None
+    return math.atan2(float((np.cross(a, b) @ z).sum()), float((a * b).sum()))
