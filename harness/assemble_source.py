@@ -134,8 +134,7 @@ def _statistics(results: Results, stream: Stream, index: int) -> doc.Statistics:
 
 def at(configurations: ConfigurationSet, index: int, seed: int) -> doc.At:
     """A configuration by its index, with its values."""
-    q = configurations.block(seed, index, index + 1)[0]
-    return doc.At(index=index, label=configurations.label(index), q=q.tolist())
+    return doc.At(index=index, label=configurations.label(index), q=configurations.one(seed, index).tolist())
 
 
 def _validity(results: Results, comparison: Comparison, participant: Participant, bound: Bound) -> doc.Validity:

@@ -65,7 +65,7 @@ def _starts(results: Results, name: str) -> list[Array]:
     if results.comparison is None:
         return []
     indices = {int(i) for part in (results.comparison.position, results.comparison.rotation) for i in part[name].argmax if i >= 0}
-    return [results.model.configurations.block(results.options.seed, i, i + 1) for i in sorted(indices)]
+    return [results.model.configurations.one(results.options.seed, i)[None, :] for i in sorted(indices)]
 
 
 def _attempt(participant: Participant, work: Callable[[Participant], Certified]) -> Certified:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-import numpy as np
-
 from harness.analysis.compare import Comparison
 from harness.analysis.shrink import shrink
 from harness.assemble import assemble
@@ -121,7 +119,7 @@ def _reproduce(results: Results, comparison: Comparison) -> dict[str, Reproduced
         if worst is None:
             continue
         frame, index = worst
-        q = results.model.configurations.block(results.options.seed, index, index + 1)[0]
+        q = results.model.configurations.one(results.options.seed, index)
         try:
             found[participant.name] = _shrunk(_bound(reference), participant.bound, frame, q, tolerance)
         except Exception as error:  # the comparison stands without its reproducer; say why it has none
@@ -143,8 +141,3 @@ def _shrunk(reference: Bound, source: Bound, frame: int, q: Array, tolerance: tu
     q = shrink(q, disagrees)
     position, rotation = errors(q)
     return Reproduced(frame, q, position, rotation, *placements(q))
-
-
-def regenerate(model: RobotModel, index: int, seed: int) -> Array:
-    """The configuration with this index, fixed ones first, then random: q (n,) [rad or m], as every run draws it."""
-    return np.asarray(model.configurations.block(seed, index, index + 1)[0])

@@ -67,12 +67,8 @@ def derive(urdf: Urdf, base: str, tip: str, convention: Convention, source: str)
     except ValueError as error:
         raise UrdfError(f"no DH table: {error}", where=urdf.path) from None
     rows = tuple(
-        DHRow(
-            name, "prismatic" if row.prismatic else "revolute",
-            tidy_length(row.a), tidy_angle(row.alpha), tidy_length(row.d), tidy_angle(row.theta),
-        )
-        for name, row in zip(names, form.rows, strict=True)
-    )  # fmt: skip
+        DHRow(r.name, r.kind, tidy_length(r.a), tidy_angle(r.alpha), tidy_length(r.d), tidy_angle(r.theta)) for r in form.rows
+    )
     table = DHTable(rows, convention, tidy_transform(form.base), tidy_transform(form.tool))
     return Derived(urdf, table, base, tip, _links(path, base, table, place), form.free, found.residual)
 

@@ -6,6 +6,7 @@ import math
 from fractions import Fraction
 
 from harness.analysis.interpolation import Axis
+from harness.description.joints import mapped_chain
 from harness.description.model import RobotModel
 
 LARGEST_DENOMINATOR = 12
@@ -50,12 +51,9 @@ def _factors(model: RobotModel) -> tuple[list[list[list[float]]], list[list[list
     sliding: list[list[list[float]]] = [[] for _ in range(n)]
     for j, name in enumerate(model.table.joints):
         (turning if model.table.kind(name) == "revolute" else sliding)[j].append([1.0])
-    if model.urdf is None or model.urdf_joints is None or model.frames.base.urdf is None:
+    if model.urdf is None or model.urdf_joints is None:
         return turning, sliding
-    chain = {}
-    for frame in model.frames.frames:
-        if frame.urdf is not None:
-            chain.update({joint.name: joint for joint in model.urdf.between(model.frames.base.urdf, frame.urdf)})
+    chain = mapped_chain(model.urdf, model.frames)
     for j in range(n):
         for into, prismatic in ((turning, False), (sliding, True)):
             driven = [

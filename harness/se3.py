@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 Array: TypeAlias = NDArray[np.float64]
 
 QUARTER_TURN = math.pi / 2
+_CHORD = 2.0 * math.sqrt(2.0)  # of half a turn
 
 
 def sincos(angle: float) -> tuple[float, float]:
@@ -87,4 +88,9 @@ def rotation_error(T_a: Array, T_b: Array) -> Array:
     (Huynh 2009, "Metrics for 3D rotations", doi:10.1007/s10851-009-0161-2).
     """
     chord = np.linalg.norm(T_a[..., :3, :3] - T_b[..., :3, :3], axis=(-2, -1))
-    return np.asarray(2.0 * np.arcsin(np.minimum(1.0, chord / (2.0 * math.sqrt(2.0)))))
+    return chord_angle(np.asarray(chord))
+
+
+def chord_angle(chord: Array) -> Array:
+    """Angle [rad] of two rotations that are a Frobenius distance `chord` apart; see `rotation_error`."""
+    return np.asarray(2.0 * np.arcsin(np.minimum(1.0, chord / _CHORD)))

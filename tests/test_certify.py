@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.analysis.certify import Evaluate, ascend, certify, chord_angle, found_from, lebesgue, sample
+from harness.analysis.certify import Evaluate, ascend, certify, found_from, lebesgue, sample
 from harness.analysis.interpolation import Axis, coefficient_sum, grid, weights
 from harness.analysis.links import Link, certify_links, sample_links
 from harness.certificates import chain_links
@@ -25,7 +25,7 @@ from harness.engines.registry import Registered
 from harness.joint_axes import UncertifiableError, joint_axes
 from harness.report.document import Certificate, Report
 from harness.results import Options
-from harness.se3 import Array
+from harness.se3 import Array, chord_angle
 
 TURN = Axis(True, 1, 0.0, 2 * math.pi)
 SLIDE = Axis(False, 1, -0.5, 1.0)

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.crosscheck import regenerate
 from harness.description.configurations import ConfigurationSet
 from harness.description.model import RobotModel, load_model
 from harness.errors import ModelFileError
@@ -63,7 +62,7 @@ def test_blocks_run_through_fixed_and_random_ones(models: dict[str, RobotModel])
     block = model.configurations.block(7, k - 2, k + 3)
     assert np.array_equal(block, np.concatenate([model.configurations.fixed_q[-2:], model.configurations.random(7, 0, 3)]))
     assert model.configurations.label(k + 2) == "random[2]"
-    assert np.array_equal(regenerate(model, k + 1, seed=7), model.configurations.random(7, 1, 1)[0])
+    assert np.array_equal(model.configurations.one(7, k + 1), model.configurations.random(7, 1, 1)[0])
 
 
 def test_declared_ranges_replace_the_urdf_limits(copy_model: Callable[..., Path]) -> None:

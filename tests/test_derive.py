@@ -89,12 +89,8 @@ def test_canonical_parameters_are_the_same_mechanism(table: DHTable, convention:
     # Nearly parallel axes have their common normal far away: accuracy is lost in proportion, and the form says so.
     reach = max([1.0, *(abs(x) for row in form.rows for x in (row.a, row.d))])
     assume(reach < 1e4)
-    rows = tuple(
-        DHRow(name, "prismatic" if row.prismatic else "revolute", row.a, row.alpha, row.d, row.theta)
-        for name, row in zip(table.joints, form.rows, strict=True)
-    )
-    again = DHTable(rows, convention, form.base, form.tool)
-    q = np.random.default_rng(2).uniform(-3, 3, (5, len(rows)))
+    again = DHTable(form.rows, convention, form.base, form.tool)
+    q = np.random.default_rng(2).uniform(-3, 3, (5, len(form.rows)))
     assert_placements_close(chain_of(again)(q), chain_of(table)(q), 1e-7 * reach)
 
 
@@ -298,9 +294,8 @@ def test_a_calibrated_arm_with_nearly_parallel_axes() -> None:
     found = screws(chain_of(table), [False] * 6, np.random.default_rng(0))
     form = canonical(found, [False] * 6, "standard", list(table.joints))
     assert [row.d for row in form.rows[1:4]] == pytest.approx(d[1:4], rel=1e-8)
-    rows = tuple(DHRow(n, "revolute", r.a, r.alpha, r.d, r.theta) for n, r in zip(table.joints, form.rows, strict=True))
     q = np.random.default_rng(1).uniform(-3, 3, (20, 6))
-    assert_placements_close(chain_of(DHTable(rows, "standard", form.base, form.tool))(q), chain_of(table)(q), 1e-9)
+    assert_placements_close(chain_of(DHTable(form.rows, "standard", form.base, form.tool))(q), chain_of(table)(q), 1e-9)
 
 
 def test_nearly_parallel_axes_are_named() -> None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from harness import se3
 from harness.analysis.screws import Screws
-from harness.description.dh import Convention
+from harness.description.dh import Convention, DHRow
 from harness.se3 import Array
 
 PARALLEL = 1e-8
@@ -23,21 +23,10 @@ ON = 1e-9
 
 
 @dataclass(frozen=True)
-class CanonicalRow:
-    """One row: a, d [m], alpha, theta [rad] at q = 0."""
-
-    prismatic: bool
-    a: float
-    alpha: float
-    d: float
-    theta: float
-
-
-@dataclass(frozen=True)
 class Canonical:
     """Rows, base and tool transforms (4, 4), and the free directions that were fixed by choice."""
 
-    rows: tuple[CanonicalRow, ...]
+    rows: tuple[DHRow, ...]
     base: Array
     tool: Array
     free: tuple[str, ...]
@@ -57,10 +46,11 @@ def canonical(screws: Screws, prismatic: list[bool], convention: Convention, nam
     axes = _axes(screws, prismatic, names)
     free = [f"{name} slides: its axis may stand anywhere" for name, slides in zip(names, prismatic, strict=True) if slides]
     frames = _frames(axes, screws.M, convention, names, free)
-    rows = []
-    for i, axis in enumerate(axes):
-        A = se3.inverse(frames[i]) @ frames[i + 1]
-        rows.append(_standard_row(A, axis.prismatic) if convention == "standard" else _modified_row(A, axis.prismatic))
+    row = _standard_row if convention == "standard" else _modified_row
+    rows = [
+        row(name, se3.inverse(frames[i]) @ frames[i + 1], axis.prismatic)
+        for i, (name, axis) in enumerate(zip(names, axes, strict=True))
+    ]
     return Canonical(tuple(rows), frames[0], se3.inverse(frames[-1]) @ screws.M, tuple(free))
 
 
@@ -167,11 +157,13 @@ def _last(axis: _Axis, M: Array, convention: Convention) -> Array:
     return _frame(_across(axis.z, x), axis.z, foot)
 
 
-def _standard_row(A: Array, prismatic: bool) -> CanonicalRow:
+def _standard_row(name: str, A: Array, prismatic: bool) -> DHRow:
     theta, alpha = math.atan2(A[1, 0], A[0, 0]), math.atan2(A[2, 1], A[2, 2])
-    return CanonicalRow(prismatic, float(A[0, 3] * math.cos(theta) + A[1, 3] * math.sin(theta)), alpha, float(A[2, 3]), theta)
+    a = float(A[0, 3] * math.cos(theta) + A[1, 3] * math.sin(theta))
+    return DHRow(name, "prismatic" if prismatic else "revolute", a, alpha, float(A[2, 3]), theta)
 
 
-def _modified_row(A: Array, prismatic: bool) -> CanonicalRow:
+def _modified_row(name: str, A: Array, prismatic: bool) -> DHRow:
     theta, alpha = math.atan2(-A[0, 1], A[0, 0]), math.atan2(-A[1, 2], A[2, 2])
-    return CanonicalRow(prismatic, float(A[0, 3]), alpha, float(A[2, 3] * math.cos(alpha) - A[1, 3] * math.sin(alpha)), theta)
+    d = float(A[2, 3] * math.cos(alpha) - A[1, 3] * math.sin(alpha))
+    return DHRow(name, "prismatic" if prismatic else "revolute", float(A[0, 3]), alpha, d, theta)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.analysis.interpolation import Axis, coefficient_sum, grid, weights
-from harness.se3 import Array
+from harness.se3 import Array, chord_angle
 
 # q (N, n) to placements (N, F, 4, 3): columns x, y, z axis and origin [m] of each frame.
 Evaluate: TypeAlias = Callable[[Array], Array]
@@ -28,18 +28,16 @@ TESTS = 64
 SWEEPS = 2
 SCAN = 96
 UNIT_ROUNDOFF = 2.0**-53
-_CHORD = 2.0 * math.sqrt(2.0)
 
 
 @dataclass(frozen=True)
 class Sampled:
     """One engine on the grid. values: (M, F, 4, 3). residual: largest entry by which the engine differs from its own
-    interpolant at random configurations; limit: what rounding explains; rounding: error allowed to one evaluation."""
+    interpolant at random configurations; limit: what rounding explains, (1 + Lebesgue constant) times that of one value."""
 
     values: Array
     residual: float
     limit: float
-    rounding: float
 
     @property
     def holds(self) -> bool:
@@ -99,8 +97,7 @@ def sample(evaluate: Evaluate, axes: list[Axis], rng: np.random.Generator) -> Sa
         predicted = np.tensordot(weights(axes, q), values, axes=1)
         residual = largest(evaluate(q) - predicted)
         reach = largest(np.linalg.norm(values[:, :, 3], axis=-1))
-    rounding = rounding_of(len(axes), reach)
-    return Sampled(values, residual, (1.0 + lebesgue(axes)) * rounding, rounding)
+    return Sampled(values, residual, (1.0 + lebesgue(axes)) * rounding_of(len(axes), reach))
 
 
 def certify(a: Sampled, b: Sampled, axes: list[Axis]) -> Bounds:
@@ -108,27 +105,27 @@ def certify(a: Sampled, b: Sampled, axes: list[Axis]) -> Bounds:
 
     Rounding: interpolating values that are off by r misses by (1 + Lebesgue constant) r at most, and is added.
     """
-    D = a.values - b.values
-    position, chord = D[:, :, 3, :], D[:, :, :3, :].reshape(*D.shape[:2], 9)
-    allowance = (1.0 + lebesgue(axes)) * (a.rounding + b.rounding)
-    bounds, methods = [], []
-    for part, entries in ((position, 3), (chord, 9)):
-        largest = np.linalg.norm(part, axis=-1).max(axis=0)
-        kernel, coefficients = lebesgue(axes) * largest, coefficient_sum(axes, part)
-        bounds.append(np.minimum(kernel, coefficients) + math.sqrt(entries) * allowance)
-        methods.append(np.where(coefficients <= kernel, "coefficients", "kernel"))
-    return Bounds(bounds[0], chord_angle(bounds[1]), tuple(str(m) for m in methods[0]))
+    D, allowance = a.values - b.values, a.limit + b.limit
+    position, method = sup_bound(axes, D[:, :, 3], allowance)
+    chord, _ = sup_bound(axes, D[:, :, :3].reshape(*D.shape[:2], 9), allowance)
+    return Bounds(position, chord_angle(chord), tuple(str(m) for m in method))
+
+
+def sup_bound(axes: list[Axis], values: Array, allowance: float) -> tuple[Array, NDArray[np.str_]]:
+    """The smaller of both bounds on an interpolant's norm over every q, and which it is.
+
+    values: (M, ..., d) on the grid; allowance: rounding of each of the d entries, added. Returns (...) twice.
+    """
+    kernel = lebesgue(axes) * _norm(values).max(axis=0)
+    coefficients = coefficient_sum(axes, values)
+    method = np.where(coefficients <= kernel, "coefficients", "kernel")
+    return np.minimum(kernel, coefficients) + math.sqrt(values.shape[-1]) * allowance, method
 
 
 def tighter(a: Bounds, b: Bounds) -> Bounds:
     """The smaller of two bounds, frame by frame: both hold."""
     method = tuple(m if x <= y else n for x, y, m, n in zip(a.position, b.position, a.method, b.method, strict=True))
     return Bounds(np.minimum(a.position, b.position), np.minimum(a.rotation, b.rotation), method)
-
-
-def chord_angle(chord: Array) -> Array:
-    """Rotation error [rad] of a Frobenius distance between rotations; see `se3.rotation_error`."""
-    return np.asarray(2.0 * np.arcsin(np.minimum(1.0, chord / _CHORD)))
 
 
 def ascend(difference: Evaluate, axes: list[Axis], starts: Array, frames: Indices, parts: Indices) -> Array:

@@ -6,17 +6,14 @@ it runs at memory speed, where (N, F, 4, 4) would need a small matrix product pe
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 
-from harness.se3 import Array
+from harness.se3 import Array, chord_angle
 
 Components: TypeAlias = Array
-
-_CHORD = 2.0 * math.sqrt(2.0)
 
 
 @dataclass(frozen=True)
@@ -92,4 +89,4 @@ def discrepancies(C_a: Components, C_b: Components) -> tuple[Array, Array]:
     np.multiply(D, D, out=D)
     position = np.sqrt(D[:, 3].sum(axis=1))
     chord = np.sqrt(D[:, :3].sum(axis=(1, 2)))
-    return position, 2.0 * np.arcsin(np.minimum(1.0, chord / _CHORD))
+    return position, chord_angle(chord)

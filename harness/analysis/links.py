@@ -16,15 +16,15 @@ import numpy as np
 from harness.analysis.certify import (
     Bounds,
     Evaluate,
-    chord_angle,
     largest,
     lebesgue,
     probes,
     rounding_of,
+    sup_bound,
     within,
 )
-from harness.analysis.interpolation import Axis, coefficient_sum, grid, weights
-from harness.se3 import Array
+from harness.analysis.interpolation import Axis, grid, weights
+from harness.se3 import Array, chord_angle
 
 
 @dataclass(frozen=True)
@@ -97,14 +97,10 @@ def certify_links(a: SampledLinks, b: SampledLinks, axes: list[Axis], links: lis
 
 def _link_bounds(a: Array, b: Array, axes: list[Axis], link: Link, allowance: float) -> tuple[float, float, float]:
     """Bounds over all q of one link: |dp| [m], |dR|_F, and the length |p_b| [m]."""
-    own = [axes[j] for j in link.joints]
-    growth, D = lebesgue(own), a - b
-    bounds = []
-    for part, entries in ((D[:, 3], 3), (D[:, :3].reshape(len(D), 9), 9), (b[:, 3], 3)):
-        kernel = growth * float(np.linalg.norm(part, axis=-1).max())
-        smaller = min(kernel, float(coefficient_sum(own, part)))
-        bounds.append(smaller + math.sqrt(entries) * allowance)
-    return bounds[0], bounds[1], bounds[2]
+    own, D = [axes[j] for j in link.joints], a - b
+    parts = (D[:, 3], D[:, :3].reshape(len(D), 9), b[:, 3])
+    shift, turn, length = (float(sup_bound(own, part, allowance)[0]) for part in parts)
+    return shift, turn, length
 
 
 def _relative(T: Array, link: Link) -> Array:

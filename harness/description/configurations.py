@@ -106,6 +106,10 @@ class ConfigurationSet:
         first = max(start, k)
         return np.concatenate([head, self.random(seed, first - k, max(0, stop - first))])
 
+    def one(self, seed: int, index: int) -> Array:
+        """The configuration with this index, (n,) [rad or m], as every run with this seed draws it."""
+        return np.asarray(self.block(seed, index, index + 1)[0])
+
     def label(self, index: int) -> str:
         """`zero`, `shoulder +90 deg`, ... or `random[17]`."""
         return self.fixed[index].name if index < len(self.fixed) else f"random[{index - len(self.fixed)}]"

@@ -103,10 +103,7 @@ def _check_chain(source: Mapping[str, str], urdf: Urdf, frames: FrameMap, path: 
     """Every joint that moves a mapped link must be driven, and every model joint must move one."""
     if frames.base.urdf is None:
         raise MappingError("the base frame needs 'urdf': placements of URDF sources are expressed in it", where=path)
-    on_chain: dict[str, UrdfJoint] = {}
-    for frame in frames.frames:
-        if frame.urdf is not None:
-            on_chain.update({j.name: j for j in urdf.between(frames.base.urdf, frame.urdf)})
+    on_chain = mapped_chain(urdf, frames)
     for joint in on_chain.values():
         if joint.type in UNSUPPORTED:
             raise UrdfError(
@@ -132,6 +129,15 @@ def _check_chain(source: Mapping[str, str], urdf: Urdf, frames: FrameMap, path: 
                 where=path,
                 key=f"joints.{name}",
             )
+
+
+def mapped_chain(urdf: Urdf, frames: FrameMap) -> dict[str, UrdfJoint]:
+    """Every joint between the base frame's link and a mapped link, by name; none if the base frame has no link."""
+    chain: dict[str, UrdfJoint] = {}
+    for frame in frames.frames:
+        if frame.urdf is not None and frames.base.urdf is not None:
+            chain.update({joint.name: joint for joint in urdf.between(frames.base.urdf, frame.urdf)})
+    return chain
 
 
 def _leader(urdf: Urdf, joint: UrdfJoint) -> UrdfJoint:

@@ -13,7 +13,7 @@ from pydantic import Field, field_validator, model_validator
 from harness.description.configurations import ConfigurationSet, ConfigurationsFile, resolve_configurations
 from harness.description.dh import Convention, DHTable, SuspectNumber, read_dh_csv
 from harness.description.frames import FrameMap, FramesFile, resolve_frames
-from harness.description.joints import JointMap, identity_map, random_limits, resolve_joints
+from harness.description.joints import JointMap, identity_map, mapped_chain, random_limits, resolve_joints
 from harness.description.locate import locate_urdf
 from harness.description.toml_file import read_toml
 from harness.description.urdf import Urdf
@@ -148,10 +148,8 @@ class RobotModel:
         if self.urdf is None or self.frames.base.urdf is None:
             return labels, []
         links = {self.frames.base.urdf: None}
-        for frame in self.frames.frames:
-            if frame.urdf is not None:
-                for joint in self.urdf.between(self.frames.base.urdf, frame.urdf):
-                    links.update({joint.parent: None, joint.child: None})
+        for joint in mapped_chain(self.urdf, self.frames).values():
+            links.update({joint.parent: None, joint.child: None})
         mapped_links = {f.urdf for f in self.frames.frames}
         return labels, [link for link in links if link not in mapped_links]
 
