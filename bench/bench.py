@@ -22,6 +22,7 @@ import torch
 import harness.crosscheck
 from harness.analysis.interpolation import Axis, grid
 from harness.analysis.links import Link, certify_links, sample_links
+from harness.binding import bind
 from harness.certificates import certify_all
 from harness.crosscheck import crosscheck
 from harness.description.dh import DHRow, DHTable
@@ -30,9 +31,10 @@ from harness.description.model import RobotModel, load_model
 from harness.engines.dh_numpy import DHNumpy
 from harness.engines.dh_pinocchio import DHPinocchio
 from harness.engines.registry import load_engine
+from harness.engines.workers import Workers
 from harness.joint_axes import joint_axes
-from harness.results import Certified, Options, Results
-from harness.sources import bind
+from harness.options import Options
+from harness.results import Certified, Results
 
 N = 100_000
 ROUNDS = 5
@@ -124,7 +126,7 @@ from pathlib import Path
 from harness.crosscheck import crosscheck
 from harness.description.locate import default_models_dir, find_model
 from harness.description.model import load_model
-from harness.results import Options
+from harness.options import Options
 model = load_model(find_model("ur5", default_models_dir()))
 crosscheck(model, Options(int(sys.argv[1]), 0, ("dh:pinocchio", "urdf:pinocchio")))
 # Not getrusage: across fork and exec it keeps the peak of the parent.
@@ -153,9 +155,9 @@ def certificate_rows() -> list[tuple[str, float, float, str]]:
         if len(nodes) != count:
             raise RuntimeError(f"expected {count} grid points, got {len(nodes)}")
 
-        def timed(results: Results, spent: list[float] = spent) -> dict[str, Certified]:
+        def timed(results: Results, workers: Workers, spent: list[float] = spent) -> dict[str, Certified]:
             start = time.perf_counter()
-            certified = certify_all(results)
+            certified = certify_all(results, workers)
             spent.append(time.perf_counter() - start)
             return certified
 

@@ -10,8 +10,6 @@ from harness.analysis.verdict import check_claim
 from harness.assemble_source import assemble_source
 from harness.description.configurations import Configuration
 from harness.description.published import Published
-from harness.engines.registry import adapter_of
-from harness.errors import CrosscheckError
 from harness.gate import verdict
 from harness.report import document as doc
 from harness.results import Results
@@ -155,13 +153,12 @@ def _lint(results: Results) -> list[doc.Lint]:
 def _environment(results: Results) -> doc.Environment:
     versions: dict[str, dict[str, str]] = {}
     for participant in results.participants:
-        try:
-            versions[participant.name] = adapter_of(participant.name).versions()
-        except CrosscheckError:  # a broken adapter: no version to tell
-            versions[participant.name] = {}
+        versions[participant.name] = participant.bound.engine.installed() if participant.bound else {}
     return doc.Environment(
         created=datetime.now(timezone.utc).isoformat(timespec="seconds"),
         duration=results.seconds,
+        loading=results.loaded_in,
+        waiting_seconds={p.name: p.bound.waited for p in results.participants if p.bound is not None},
         engine_seconds={p.name: p.bound.seconds for p in results.participants if p.bound is not None},
         versions=versions,
         harness=__version__,

@@ -8,13 +8,14 @@ from harness.analysis.compare import Comparison
 from harness.analysis.noise import NoiseClass, classify
 from harness.analysis.statistics import Stream
 from harness.analysis.verdict import FAILING, judge
+from harness.binding import Bound
 from harness.description.configurations import ConfigurationSet
 from harness.engines.base import Trait
 from harness.engines.registry import adapter_of
 from harness.errors import CrosscheckError
 from harness.report import document as doc
 from harness.results import Results
-from harness.sources import Bound, Participant, deviation_on_file, pair_tolerance
+from harness.sources import Participant, deviation_on_file, pair_tolerance
 
 
 def assemble_source(results: Results, participant: Participant) -> doc.Source:
@@ -41,8 +42,7 @@ def assemble_source(results: Results, participant: Participant) -> doc.Source:
         return part.model_copy(update={"status": "not run", "reason": why})
     part = part.model_copy(update={"validity": _validity(results, results.comparison, participant, bound)})
     if participant is reference:
-        valid = part.validity is None or part.validity.invalid == 0
-        return part.model_copy(update={"verdict": "reference" if valid else "invalid placements"})
+        return part.model_copy(update={"verdict": _unfit(results.comparison, participant) or "reference"})
     return _judged(results, results.comparison, participant, bound, part)
 
 
@@ -58,15 +58,13 @@ def _judged(results: Results, comparison: Comparison, participant: Participant, 
         if all(end.should_have(index) for end in ends)
     ]
     failing = [f for f in frames if f.verdict in FAILING]
-    invalid = part.validity is not None and part.validity.invalid > 0
+    if not frames:
+        update = {"status": "failed", "verdict": "failed", "reason": f"has no frame in common with {reference.name}"}
+        return part.model_copy(update=update)
     worst = max(frames, key=lambda f: max(f.position.max / tolerance[0], f.rotation.max / tolerance[1]))
     noise = classify(max(f.position.max for f in frames), max(f.rotation.max for f in frames), comparison.reach)
-    if invalid:
-        verdict = "invalid placements"
-    elif failing:
-        verdict = "disagrees"
-    else:
-        verdict = "agrees as accepted" if any(f.verdict == "accepted" for f in frames) else "agrees"
+    agrees = "agrees as accepted" if any(f.verdict == "accepted" for f in frames) else "agrees"
+    verdict = _unfit(comparison, participant) or ("disagrees" if failing else agrees)
     return part.model_copy(
         update={
             "verdict": verdict,
@@ -80,6 +78,12 @@ def _judged(results: Results, comparison: Comparison, participant: Participant, 
             "certificate": certificate,
         }
     )
+
+
+def _unfit(comparison: Comparison, participant: Participant) -> str:
+    """Why the answers of a source are no placements of a mechanism, if they are not."""
+    validity = comparison.validity[participant.name]
+    return "invalid placements" if validity.invalid else "keeps state" if validity.stateful else ""
 
 
 def _frame(
@@ -146,6 +150,8 @@ def _validity(results: Results, comparison: Comparison, participant: Participant
         residual=seen.residual,
         first=at(results.model.configurations, first[0], results.options.seed) if first else None,
         first_frame=bound.frames[first[1]] if first else "",
+        again=seen.again,
+        again_at=at(results.model.configurations, seen.again_at, results.options.seed) if seen.again_at >= 0 else None,
     )
 
 
@@ -163,10 +169,13 @@ def _traits(results: Results, source: str) -> list[doc.TraitNote]:
 
 def _joint_notes(results: Results, bound: Bound) -> dict[str, object]:
     """What the engine was given for mimic followers, and which joints were held at zero."""
+    names = results.model.engine_names.get(bound.engine.source)
+    mapping = [f"placements read in {names.base}"] if names and names.base else []
+    mapping += [f"without {', '.join(names.without)}"] if names and names.without else []
     held = [j for j in bound.joint_map.held if j in bound.engine.joints]
     followers = bound.joint_map.followers
     if not followers:
-        return {"held": held}
+        return {"held": held, "mapping": "; ".join(mapping)}
     passed = [j for j in followers if j in bound.engine.joints]
     applied = [j for j in followers if j not in bound.engine.joints]
     texts = []
@@ -174,7 +183,7 @@ def _joint_notes(results: Results, bound: Bound) -> dict[str, object]:
         texts.append(f"passed multiplier * q + offset for {', '.join(passed)}")
     if applied:
         texts.append(f"the engine itself moves {', '.join(applied)}")
-    return {"held": held, "mimic": "; ".join(texts)}
+    return {"held": held, "mapping": "; ".join(mapping), "mimic": "; ".join(texts)}
 
 
 def _evidence(results: Results, traits: list[doc.TraitNote], noise: NoiseClass) -> list[str]:

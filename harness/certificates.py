@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 
@@ -12,16 +14,20 @@ from harness.analysis.certify import Bounds, Evaluate, Sampled, certify, found_f
 from harness.analysis.components import components, mapped
 from harness.analysis.interpolation import Axis, grid, weights
 from harness.analysis.links import Link, SampledLinks, certify_links, sample_links
+from harness.binding import Bound
 from harness.description.model import RobotModel
+from harness.engines.workers import Workers
 from harness.joint_axes import UncertifiableError, joint_axes
 from harness.results import Certified, Results
 from harness.se3 import Array
-from harness.sources import Bound, Participant
+from harness.sources import Participant
 
 GRID_LIMIT = 4096
 
+Certify: TypeAlias = "Callable[[Participant], Certified]"
 
-def certify_all(results: Results) -> dict[str, Certified]:
+
+def certify_all(results: Results, workers: Workers) -> dict[str, Certified]:
     """A certificate, or the reason why there is none, for every source that ran, by name."""
     reference, *others = results.participants
     running = [p for p in others if p.bound is not None]
@@ -31,7 +37,9 @@ def certify_all(results: Results) -> dict[str, Certified]:
         axes = joint_axes(results.model)
         nodes = math.prod(axis.count for axis in axes)
         make = _by_grid if nodes <= GRID_LIMIT else _by_links
-        return make(results, reference, running, axes)
+        one = make(results, reference, axes)
+        tasks = {p.name: workers.submit(partial(_attempt, p, one)) for p in running}
+        return {name: task.result() for name, task in tasks.items()}
     except UncertifiableError as why:
         return {p.name: Certified(reason=str(why)) for p in running}
 
@@ -78,20 +86,19 @@ def _attempt(participant: Participant, work: Callable[[Participant], Certified])
         return Certified(reason=f"{participant.name} raised {type(error).__name__}: {error}")
 
 
-def _by_grid(results: Results, reference: Participant, others: list[Participant], axes: list[Axis]) -> dict[str, Certified]:
+def _by_grid(results: Results, reference: Participant, axes: list[Axis]) -> Certify:
     nodes = grid(axes)
 
     def sampled(participant: Participant) -> Sampled:
-        return sample(_evaluate(_bound(participant)), axes, np.random.default_rng(results.options.seed))
+        return sample(_evaluate(participant.running()), axes, np.random.default_rng(results.options.seed))
 
     try:
         base = sampled(reference)
     except Exception as error:  # an engine's failure is its result
-        why = f"{reference.name} raised {type(error).__name__}: {error}"
-        return {p.name: Certified(reason=why) for p in others}
+        raise UncertifiableError(f"{reference.name} raised {type(error).__name__}: {error}") from error
 
     def one(participant: Participant) -> Certified:
-        own, common = sampled(participant), _Common.of(_bound(participant), _bound(reference))
+        own, common = sampled(participant), _Common.of(participant.running(), reference.running())
         known = Certified("", "grid", len(nodes), own.residual, base.residual, own.limit, common.frames)
         if reason := _refusal(own, base, participant.name, reference.name):
             return replace(known, reason=reason)
@@ -108,12 +115,12 @@ def _by_grid(results: Results, reference: Participant, others: list[Participant]
             lambda q: np.tensordot(weights(axes, q), D, axes=1),
         )  # fmt: skip
 
-    return {p.name: _attempt(p, one) for p in others}
+    return one
 
 
-def _by_links(results: Results, reference: Participant, others: list[Participant], axes: list[Axis]) -> dict[str, Certified]:
+def _by_links(results: Results, reference: Participant, axes: list[Axis]) -> Certify:
     def one(participant: Participant) -> Certified:
-        common = _Common.of(_bound(participant), _bound(reference))
+        common = _Common.of(participant.running(), reference.running())
         own, base, bounds = _link_bounds(results, participant, reference, axes, common)
         count = sum(len(value) for value in own.values)
         known = Certified("", "links", count, own.residual, base.residual, own.limit, common.frames)
@@ -122,7 +129,7 @@ def _by_links(results: Results, reference: Participant, others: list[Participant
         starts = np.concatenate(_starts(results, participant.name))
         return _with_found(known, bounds, participant, reference, axes, starts, None)
 
-    return {p.name: _attempt(p, one) for p in others}
+    return one
 
 
 def _link_bounds(
@@ -133,7 +140,7 @@ def _link_bounds(
     if any(math.prod(axes[j].count for j in link.joints) > GRID_LIMIT for link in links):
         raise UncertifiableError("too many joints between two mapped frames: map the frames between them")
     own, base = (
-        sample_links(_rows(_evaluate(_bound(p)), rows), axes, links, np.random.default_rng(results.options.seed))
+        sample_links(_rows(_evaluate(p.running()), rows), axes, links, np.random.default_rng(results.options.seed))
         for p, rows in ((participant, common.rows_a), (reference, common.rows_b))
     )
     return own, base, certify_links(own, base, axes, links, len(common.frames))
@@ -165,12 +172,6 @@ def _driving(model: RobotModel, parent: str | None, child: str | None) -> set[in
     return {int(j) for j in np.flatnonzero(model.urdf_joints.A[rows].any(axis=0))}
 
 
-def _bound(participant: Participant) -> Bound:
-    if participant.bound is None:
-        raise RuntimeError(f"{participant.name} is not bound")
-    return participant.bound
-
-
 def _refusal(own: Sampled | SampledLinks, base: Sampled | SampledLinks, name: str, reference: str) -> str:
     for who, sampled in ((name, own), (reference, base)):
         if not sampled.holds:
@@ -186,8 +187,8 @@ def _with_found(
     interpolant: Evaluate | None,
 ) -> Certified:  # fmt: skip
     """Add the bounds and the largest discrepancies found; a bound that is exceeded is no bound, and refused."""
-    common = _Common.of(_bound(participant), _bound(reference))
-    a, b = _evaluate(_bound(participant)), _evaluate(_bound(reference))
+    common = _Common.of(participant.running(), reference.running())
+    a, b = _evaluate(participant.running()), _evaluate(reference.running())
 
     def difference(q: Array) -> Array:
         return np.asarray(a(q)[:, common.rows_a] - b(q)[:, common.rows_b])

@@ -23,10 +23,10 @@ from harness.description.urdf import Urdf
 from harness.description.urdf_file import read_urdf
 from harness.description.urdf_lint import check
 from harness.errors import InputError
+from harness.options import Options
 from harness.report.document import Report
 from harness.report.files import write
 from harness.report.text import plain
-from harness.results import Options
 from harness.write_model import export_urdf, write_model
 
 SAMPLES = 200

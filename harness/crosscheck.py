@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from functools import partial
 
 from harness.analysis.compare import Comparison
 from harness.analysis.shrink import shrink
 from harness.assemble import assemble
+from harness.binding import Bound, bind, measure_rigid, wanted_frames
 from harness.certificates import certify_all
 from harness.description.model import RobotModel
+from harness.engines import protocol
+from harness.engines.base import Engine
 from harness.engines.dh_numpy import DHNumpy
-from harness.engines.registry import load_engine
+from harness.engines.registry import adapter_of, description_of, kind_of
+from harness.engines.workers import Workers
+from harness.options import Options
 from harness.report.document import Report
-from harness.results import Options, Reproduced, Results
+from harness.results import Reproduced, Results
 from harness.se3 import Array, position_error, rotation_error
-from harness.sources import Bound, Participant, bind, measure_rigid, pair_tolerance, plan
-
-BLOCK = 4096
-SUBSET = 256
-
-Progress = Callable[[int, int], None]
+from harness.sources import Participant, Planned, pair_tolerance, plan
+from harness.streaming import Progress, compare
 
 
 def crosscheck(model: RobotModel, options: Options, progress: Progress | None = None) -> Report:
@@ -30,77 +31,52 @@ def crosscheck(model: RobotModel, options: Options, progress: Progress | None = 
     or failing engine is part of the report.
     """
     started = time.perf_counter()
-    participants = [Participant(planned) for planned in plan(model, options.sources, options.reference)]
+    participants = [Participant(planned) for planned in plan(model, options)]
     results = Results(model, options, participants)
-    _bind_all(results)
-    results.comparison = _compare(results, progress)
-    if results.comparison is not None:
-        results.reproduced = _reproduce(results, results.comparison)
-        if options.certify:
-            results.certified = certify_all(results)
+    with Workers(options.limits, options.jobs, options.in_process) as workers:
+        _bind_all(results, workers)
+        results.loaded_in = time.perf_counter() - started
+        results.comparison = compare(results, workers, progress)
+        if results.comparison is not None:
+            results.reproduced = _reproduce(results, results.comparison)
+            if options.certify:
+                results.certified = certify_all(results, workers)
     results.seconds = time.perf_counter() - started
     return assemble(results)
 
 
-def _bind_all(results: Results) -> None:
+def _load(planned: Planned, model: RobotModel, workers: Workers) -> Engine:
+    frames = wanted_frames(planned.name, model)
+    if not planned.command:
+        adapter = adapter_of(planned.name)
+        return workers.load(adapter, description_of(planned.name, model, adapter.takes), frames)
+    command = [word.replace("{model}", str(model.folder.resolve())) for word in planned.command]
+    greeting = protocol.greeting(description_of(planned.name, model), frames)
+    return workers.start(planned.name, command, greeting, planned.folder)
+
+
+def _bind_all(results: Results, workers: Workers) -> None:
     """Load every engine, measure the rigid offsets with the first URDF source that answers, then bind for good."""
     model = results.model
     q = model.configurations.lattice()
     in_house = bind(DHNumpy(model.table), model, {})
     needs_measuring = any(frame.relation == "rigid" for frame in model.frames.frames)
     engines = {}
-    for participant in results.participants:
+    tasks = [(p, workers.submit(partial(_load, p.planned, model, workers))) for p in results.participants]
+    for participant, task in tasks:
         try:
-            engine = engines[participant.name] = load_engine(participant.name, model)
-            participant.bound = bind(engine, model, {})
-            if needs_measuring and not results.offsets and participant.name.startswith("urdf:"):
+            engine = engines[participant.name] = task.result()
+            participant.bound = bind(engine, model, {}, bool(participant.planned.command))
+            if needs_measuring and not results.offsets and kind_of(participant.name) == "urdf":
                 results.offsets = measure_rigid(model, in_house, participant.bound, q)
                 results.measured_from = participant.name
         except Exception as error:  # an engine's failure is its result
             participant.fail(error)
     for participant in results.participants:
         if participant.bound is not None:
-            participant.bound = bind(engines[participant.name], model, results.offsets)
+            partial_frames = bool(participant.planned.command)
+            participant.bound = bind(engines[participant.name], model, results.offsets, partial_frames)
     results.in_house = bind(DHNumpy(model.table), model, results.offsets)
-
-
-def _compare(results: Results, progress: Progress | None) -> Comparison | None:
-    """Stream all configurations through all sources. None if the reference is out."""
-    configurations, options = results.model.configurations, results.options
-    fixed = len(configurations.fixed)
-    total = fixed + options.samples
-    reference = results.participants[0]
-    live = {p.name: p for p in results.participants if p.bound is not None}
-    comparison = Comparison(
-        {name: p.bound.view for name, p in live.items() if p.bound is not None},
-        reference.name,
-        len(results.model.frames.frames),
-        fixed + min(SUBSET, options.samples),
-    )
-    for start in range(0, total, BLOCK):
-        stop = min(start + BLOCK, total)
-        q = configurations.block(options.seed, start, stop)
-        raw: dict[str, Array] = {}
-        for name, participant in list(live.items()):
-            try:
-                raw[name] = _bound(participant).raw(q)
-            except Exception as error:  # an engine's failure is its result
-                participant.fail(error)
-                participant.reason += f" (configurations {start} to {stop - 1})"
-                comparison.drop(name)
-                del live[name]
-        if reference.name not in live:
-            return None
-        comparison.update(start, raw)
-        if progress:
-            progress(stop, total)
-    return comparison
-
-
-def _bound(participant: Participant) -> Bound:
-    if participant.bound is None:
-        raise RuntimeError(f"{participant.name} is not bound")
-    return participant.bound
 
 
 def _reproduce(results: Results, comparison: Comparison) -> dict[str, Reproduced]:
@@ -121,7 +97,7 @@ def _reproduce(results: Results, comparison: Comparison) -> dict[str, Reproduced
         frame, index = worst
         q = results.model.configurations.one(results.options.seed, index)
         try:
-            found[participant.name] = _shrunk(_bound(reference), participant.bound, frame, q, tolerance)
+            found[participant.name] = _shrunk(reference.running(), participant.bound, frame, q, tolerance)
         except Exception as error:  # the comparison stands without its reproducer; say why it has none
             participant.reason = f"no reproducer: {type(error).__name__}: {error}"
     return found

@@ -13,6 +13,7 @@ from harness.analysis.screws import screws
 from harness.description.dh import Convention, DHRow, DHTable
 from harness.description.tidy import tidy_angle, tidy_length, tidy_transform
 from harness.description.urdf import MOVABLE, UNSUPPORTED, Urdf, UrdfJoint
+from harness.engines import requirements
 from harness.engines.dh_numpy import DHNumpy
 from harness.engines.registry import adapter_of
 from harness.errors import EngineFailed, InputError, UrdfError, nearest
@@ -90,7 +91,9 @@ def _chain_joints(urdf: Urdf, path: tuple[UrdfJoint, ...], base: str, tip: str) 
 
 def _placer(urdf: Urdf, joints: list[str], base: str, source: str) -> Callable[[Array, list[str]], Array]:
     """q (N, n) and link names to placements in the base link, (N, links, 4, 4); all other joints at zero."""
-    engine = adapter_of(source)(urdf)
+    adapter = adapter_of(source)
+    requirements.check(adapter)
+    engine = adapter(urdf)
     if missing := [name for name in joints if name not in engine.joints]:
         raise EngineFailed(source, f"does not have joint {missing[0]!r}")
 

@@ -10,7 +10,7 @@ def verdict(robot: str, sources: list[doc.Source], published: list[doc.Published
     """The gate. A disagreement found (1) stays found even if a required source is missing (3)."""
     wrong, missing = [], []
     for source in sources:
-        if source.verdict in ("disagrees", "invalid placements"):
+        if source.verdict in ("disagrees", "invalid placements", "keeps state"):
             wrong.append(f"{source.name}: {describe(source)}")
         elif source.status != "ran" and source.required:
             install = f" ({source.install})" if source.install else ""
@@ -20,7 +20,7 @@ def verdict(robot: str, sources: list[doc.Source], published: list[doc.Published
     compared = [s for s in sources if s.frames]
     if not compared and not missing and not wrong:
         missing.append("no source was compared: " + "; ".join(f"{s.name} {s.status}" for s in sources))
-    skipped = [s.name for s in sources if s.status != "ran" and not s.required]
+    aside = {status: [s.name for s in sources if s.status == status and not s.required] for status in ("not run", "failed")}
     if wrong:
         sentence = f"{robot} DISAGREES: {wrong[0]}"
         return doc.Verdict(exit_code=1, sentence=sentence, reasons=wrong + missing)
@@ -32,8 +32,9 @@ def verdict(robot: str, sources: list[doc.Source], published: list[doc.Published
     if accepted:
         sentence += f", {accepted} deviations as accepted"
     sentence += _for_all(compared)
-    if skipped:
-        sentence += f"; not run: {', '.join(skipped)}"
+    for status, names in aside.items():
+        if names:
+            sentence += f"; {status}: {', '.join(names)}"
     if settings.not_chosen:
         sentence += f"; not chosen: {', '.join(settings.not_chosen)}"
     return doc.Verdict(exit_code=0, sentence=sentence)
@@ -72,6 +73,9 @@ def describe(source: doc.Source) -> str:
             f"{v.invalid} of {v.checked} placements are not rigid transforms (residual {v.residual:.2g}), "
             f"first {v.first_frame} at {v.first.label if v.first else ''}"
         )
+    if source.verdict == "keeps state" and source.validity is not None and source.validity.again_at is not None:
+        v, at = source.validity, source.validity.again_at
+        return f"its answer for {at.label} changed by {v.again:.2g} when asked again: it depends on what was asked before"
     worst = next(f for f in source.frames if f.frame == source.worst_frame)
     failing = [f for f in source.frames if f.verdict not in ("agrees", "accepted")]
     if worst.verdict in ("agrees", "accepted"):

@@ -14,6 +14,7 @@ from harness.description.model import RobotModel, load_model
 from harness.description.urdf import Urdf, UrdfJoint
 from harness.description.urdf_file import read_urdf
 from harness.description.urdf_lint import lint
+from harness.engines.environments import where
 from harness.engines.registry import registered
 from harness.errors import EngineUnavailable
 from harness.report.text import numbers, plain
@@ -109,9 +110,8 @@ def show_engines(console: Console) -> int:
             console.print(Text(name, style="bold"), Text(f"broken: {plain(entry.problem)}", style="red"), soft_wrap=True)
             continue
         try:
-            entry.adapter.check_requirements()
-            versions = ", ".join(f"{k} {v}" for k, v in entry.adapter.versions().items()) or "built in"
-            console.print(Text(name, style="bold"), Text(versions, style="green"), soft_wrap=True)
+            found = ", ".join(f"{k} {v}" for k, v in where(entry.adapter).versions.items()) or "built in"
+            console.print(Text(name, style="bold"), Text(found, style="green"), soft_wrap=True)
         except EngineUnavailable as error:
             text = f"not installed: {error.reason}; {error.install}"
             console.print(Text(name, style="bold"), Text(plain(text), style="yellow"), soft_wrap=True)

@@ -1,4 +1,4 @@
-"""What a cross-check is asked for, and what it has found before it becomes a report."""
+"""What a run has found, before it becomes a report."""
 
 from __future__ import annotations
 
@@ -7,30 +7,11 @@ from dataclasses import dataclass, field
 
 from harness.analysis.certify import Bounds
 from harness.analysis.compare import Comparison
+from harness.binding import Bound
 from harness.description.model import RobotModel
-from harness.engines.registry import REFERENCE
-from harness.errors import InputError
+from harness.options import Options
 from harness.se3 import Array
-from harness.sources import Bound, Participant
-
-
-@dataclass(frozen=True)
-class Options:
-    """What a cross-check is asked to do. `sources` empty: those of model.toml. `command` is shown as how to reproduce."""
-
-    samples: int = 2000
-    seed: int = 0
-    sources: tuple[str, ...] = ()
-    reference: str = REFERENCE
-    command: str = ""
-    certify: bool = True
-
-    def __post_init__(self) -> None:
-        """Refuse impossible numbers. Raises InputError."""
-        if self.samples < 0:
-            raise InputError(f"expected samples >= 0, got {self.samples}")
-        if not 0 <= self.seed < 2**64:
-            raise InputError(f"expected 0 <= seed < 2^64, got {self.seed}")
+from harness.sources import Participant
 
 
 @dataclass(frozen=True)
@@ -79,3 +60,4 @@ class Results:
     reproduced: dict[str, Reproduced] = field(default_factory=dict)
     certified: dict[str, Certified] = field(default_factory=dict)
     seconds: float = 0.0
+    loaded_in: float = 0.0

@@ -23,8 +23,8 @@ from harness.engines.base import Engine
 from harness.engines.dh_numpy import DHNumpy
 from harness.engines.registry import Registered
 from harness.joint_axes import UncertifiableError, joint_axes
+from harness.options import Options
 from harness.report.document import Certificate, Report
-from harness.results import Options
 from harness.se3 import Array, chord_angle
 
 TURN = Axis(True, 1, 0.0, 2 * math.pi)

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from harness import se3
 from harness.analysis.canonical import canonical
 from harness.analysis.screws import Chain, adjoint, exp, fit_gauge, log, rebuild, screws
+from harness.binding import bind
 from harness.cli_derive import verify
 from harness.crosscheck import crosscheck
 from harness.derive import derive
@@ -29,9 +30,8 @@ from harness.description.values import parse_number
 from harness.engines.dh_numpy import DHNumpy
 from harness.engines.registry import load_engine
 from harness.errors import InputError, UrdfError
-from harness.results import Options
+from harness.options import Options
 from harness.se3 import Array
-from harness.sources import bind
 from harness.write_model import export_urdf
 from tests.helpers import assert_placements_close, tables, transforms
 

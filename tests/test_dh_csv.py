@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from harness.description.dh import DHRow, read_dh_csv
+from harness.description.dh import DHRow
+from harness.description.dh_csv import read_dh_csv
 from harness.errors import ModelFileError
 
 HEADER = "joint,type,a,alpha,d,theta\n"

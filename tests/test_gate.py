@@ -11,15 +11,15 @@ import pytest
 
 from harness.crosscheck import crosscheck
 from harness.description.model import RobotModel, load_model
-from harness.engines import registry
+from harness.engines import registry, requirements
 from harness.engines.base import Engine
 from harness.engines.dh_numpy import DHNumpy
 from harness.engines.registry import Registered
 from harness.engines.urdf_pinocchio import UrdfPinocchio
 from harness.errors import InputError
+from harness.options import Options
 from harness.report.document import Report, Source
 from harness.report.json_file import to_json
-from harness.results import Options
 from harness.se3 import Array
 from tests.conftest import WITHOUT, Edit
 
@@ -240,7 +240,7 @@ class Missing(Fake):
     requirements = ("no-such-distribution",)
 
     def __init__(self, description: object) -> None:
-        self.check_requirements()
+        requirements.check(type(self))
 
 
 class Refuses(Fake):

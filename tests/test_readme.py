@@ -14,7 +14,7 @@ from pydantic import BaseModel
 
 from harness.cli import cli
 from harness.description.configurations import ConfigurationsFile
-from harness.description.frames import FramesFile
+from harness.description.frames_file import FramesFile
 from harness.description.model import ModelFile
 from harness.engines.registry import registered
 

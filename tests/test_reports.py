@@ -16,6 +16,7 @@ from lxml import html as lxml_html
 from harness.crosscheck import crosscheck
 from harness.description.model import RobotModel, load_model
 from harness.errors import InputError
+from harness.options import Options
 from harness.report.document import Report
 from harness.report.files import prepare, write, write_index, write_report
 from harness.report.html import bars, colour, render_html, render_index
@@ -23,7 +24,6 @@ from harness.report.json_file import read_report, schema, to_json
 from harness.report.junit import render_junit
 from harness.report.markdown import render_markdown
 from harness.report.text import metres, numbers, plain, radians
-from harness.results import Options
 
 FAST = ("dh:pinocchio", "urdf:pinocchio")
 

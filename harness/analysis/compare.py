@@ -24,6 +24,7 @@ Mask: TypeAlias = NDArray[np.bool_]
 
 CHUNK = 1024
 VALID = 1e-6
+SAME = 1e-9  # batches round differently from single configurations, float32 origins and all
 HUGE = 1e100  # beyond this a length is as good as infinite: its square would be
 
 
@@ -32,13 +33,21 @@ class Validity:
     """Whether a source's placements are placements: finite, last row 0 0 0 1, rotation in SO(3) to within `VALID`.
 
     `residual` is the worst |R'R - I| kind of error seen (see `rotation_residual`); `first` is (configuration index, raw
-    frame index) of the first placement that failed.
+    frame index) of the first placement that failed. `again` is the largest difference between what the source answered for
+    configuration `again_at` and what it answers when asked for it again, alone.
     """
 
     checked: int = 0
     invalid: int = 0
     residual: float = 0.0
     first: tuple[int, int] | None = None
+    again: float = 0.0
+    again_at: int = -1
+
+    @property
+    def stateful(self) -> bool:
+        """Whether the answer depends on what was asked before, by more than rounding does."""
+        return self.again > SAME
 
 
 @dataclass

@@ -21,12 +21,14 @@ class View:
     """How mapped frames are read off one source's raw placements.
 
     slots: (F,) index of the raw frame of each mapped frame, -1 if the source does not have it; offsets: (F, 4, 4)
-    constant transform behind it; base: raw frame in which placements are to be expressed, None if they already are.
+    constant transform behind it; base: raw frame in which placements are to be expressed, None if they already are;
+    front: (4, 4) constant transform before it all, T_base_raw, None if it is the identity.
     """
 
     slots: tuple[int, ...]
     offsets: Array
     base: int | None
+    front: Array | None = None
 
     @property
     def available(self) -> list[int]:
@@ -48,9 +50,15 @@ def matrices(C: Components) -> Array:
 
 
 def mapped(C: Components, view: View) -> Components:
-    """Raw components of a source to the mapped frames it has, in order of `view.available`: T_base^-1 T_frame offset."""
+    """Raw components of a source to the mapped frames it has, in order of `view.available`.
+
+    front T_base^-1 T_frame offset, as far as the view has them.
+    """
     available = view.available
     raw = C if view.base is None else _relative(C, C[view.base])
+    if view.front is not None:
+        raw = np.einsum("ri,fkin->fkrn", view.front[:3, :3], raw)
+        raw[:, 3] += view.front[:3, 3, None]
     picked = raw[[view.slots[f] for f in available]]
     F, _, _, N = picked.shape
     # Columns of T X are combinations of the columns of T: a (4 x 4) by (4 x 3N) product a frame.

@@ -10,76 +10,20 @@ An entry without `urdf` is compared among DH sources only.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
 
 from harness.description.dh import DHTable
+from harness.description.frames_file import FrameEntry, FramesFile
 from harness.description.urdf import Urdf
-from harness.description.values import Number, Strict, Transform, Vector3
 from harness.errors import MappingError, nearest
 from harness.se3 import Array
 
 Relation = Literal["identical", "declared", "rigid"]
-
-
-class FrameEntry(Strict):
-    """One `[[frame]]` as written."""
-
-    name: str = Field(min_length=1)
-    dh: int | str | None = None
-    urdf: str | None = None
-    of: str | None = None
-    xyz: Vector3 | None = None
-    rpy: Vector3 | None = None
-    rigid: bool = False
-
-    @model_validator(mode="after")
-    def _one_meaning(self) -> FrameEntry:
-        declared = self.xyz is not None or self.rpy is not None
-        if (self.dh is None) == (self.of is None):
-            raise ValueError("expected exactly one of 'dh' and 'of'")
-        if self.rigid and (declared or self.of is not None):
-            raise ValueError("'rigid' means the offset is measured: leave out xyz, rpy and of")
-        if self.of is not None and not declared:
-            raise ValueError("'of' needs the offset: xyz, rpy or both (zeros, if it is the same frame)")
-        if self.urdf is None and (self.rigid or self.of is not None):
-            raise ValueError("an entry with 'rigid' or 'of' needs 'urdf'")
-        return self
-
-    @property
-    def offset(self) -> Array:
-        """Declared offset as (4, 4); identity if none is."""
-        if self.xyz is None and self.rpy is None:
-            return np.eye(4)
-        return Transform(xyz=self.xyz or [0.0] * 3, rpy=self.rpy or [0.0] * 3).matrix()
-
-
-class JointEntry(Strict):
-    """One `[joints.NAME]`: q_urdf = sign * q[NAME] + sum(coupling[k] * q[k]) + offset; `urdf` defaults to NAME."""
-
-    urdf: str | None = None
-    sign: Literal[-1, 1] = 1
-    offset: Number = 0.0
-    coupling: dict[str, Number] = {}
-
-
-class FramesFile(Strict):
-    """frames.toml."""
-
-    frame: list[FrameEntry] = Field(min_length=1)
-    joints: dict[str, JointEntry] = {}
-
-    @field_validator("joints", mode="before")
-    @classmethod
-    def _short_form(cls, value: Any) -> Any:
-        """`elbow = "elbow_joint"` is short for `elbow = {urdf = "elbow_joint"}`."""
-        if isinstance(value, dict):
-            return {k: {"urdf": v} if isinstance(v, str) else v for k, v in value.items()}
-        return value
 
 
 @dataclass(frozen=True)
@@ -127,18 +71,22 @@ def resolve_frames(file: FramesFile, table: DHTable, urdf: Urdf | None, path: Pa
         if mapped.relation == "identical":
             _once(taken, ("dh", mapped.dh), i, path, f"{key}.dh", f"DH frame {mapped.dh} without an offset")
         frames.append(mapped)
-    _reaches_every_joint(frames, table, path)
+    reaches_every_joint(frames, table, path, "frame")
     return FrameMap(tuple(frames), _base(frames, table, path))
 
 
-def _reaches_every_joint(frames: list[MappedFrame], table: DHTable, path: Path) -> None:
-    """A joint behind the last mapped frame would never be checked, and the gate would pass by accident."""
-    last = max(table.frames.index(frame.dh) for frame in frames)
-    beyond = [row.name for i, row in enumerate(table.rows, start=1) if row.kind != "fixed" and table.frames.index(str(i)) > last]
-    if beyond:
-        raise MappingError(
-            f"no mapped frame moves with joint {beyond[0]!r}", where=path, hint="map a frame at the end of the chain"
-        )
+def unchecked_joint(frames: Iterable[MappedFrame], table: DHTable) -> str:
+    """The first joint behind the last of these frames, which none of them shows; empty if there is none."""
+    last = max((table.frames.index(frame.dh) for frame in frames), default=-1)
+    moving = ((i, row.name) for i, row in enumerate(table.rows, start=1) if row.kind != "fixed")
+    return next((name for i, name in moving if table.frames.index(str(i)) > last), "")
+
+
+def reaches_every_joint(frames: Iterable[MappedFrame], table: DHTable, path: Path, key: str) -> None:
+    """Raise MappingError if a joint would never be checked."""
+    if joint := unchecked_joint(frames, table):
+        hint = "map a frame at the end of the chain"
+        raise MappingError(f"no mapped frame moves with joint {joint!r}", where=path, key=key, hint=hint)
 
 
 def _once(seen: dict[Any, int], item: Any, i: int, path: Path, key: str, what: str) -> None:

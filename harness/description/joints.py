@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from harness.description.dh import DHTable
-from harness.description.frames import FrameMap, JointEntry
+from harness.description.frames import FrameMap
+from harness.description.frames_file import JointEntry
 from harness.description.urdf import MOVABLE, UNSUPPORTED, Urdf, UrdfJoint
 from harness.errors import MappingError, UrdfError, nearest
 from harness.se3 import Array
@@ -29,6 +30,23 @@ class JointMap:
     b: Array
     followers: tuple[str, ...] = ()
     held: tuple[str, ...] = ()
+
+    @property
+    def moved(self) -> tuple[str, ...]:
+        """Joints that some model joint moves."""
+        return tuple(name for name, row in zip(self.names, self.A, strict=True) if row.any())
+
+    def renamed(self, names: Mapping[str, str]) -> JointMap:
+        """The same map, with joints under other names as far as `names` gives them."""
+        if not names:
+            return self
+        new = {name: names.get(name, name) for name in self.names}
+        return replace(
+            self,
+            names=tuple(new.values()),
+            followers=tuple(new[name] for name in self.followers),
+            held=tuple(new[name] for name in self.held),
+        )
 
     def values(self, q: Array, joints: tuple[str, ...]) -> Array:
         """Values of the named joints, (N, len(joints)). Raises KeyError for a joint not in the map."""

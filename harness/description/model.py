@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Literal
 
@@ -11,8 +12,11 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from harness.description.configurations import ConfigurationSet, ConfigurationsFile, resolve_configurations
-from harness.description.dh import Convention, DHTable, SuspectNumber, read_dh_csv
-from harness.description.frames import FrameMap, FramesFile, resolve_frames
+from harness.description.dh import Convention, DHTable
+from harness.description.dh_csv import SuspectNumber, read_dh_csv
+from harness.description.engine_names import check_engine_names
+from harness.description.frames import FrameMap, resolve_frames
+from harness.description.frames_file import EngineNames, FramesFile
 from harness.description.joints import JointMap, identity_map, mapped_chain, random_limits, resolve_joints
 from harness.description.locate import locate_urdf
 from harness.description.toml_file import read_toml
@@ -43,17 +47,29 @@ class Tolerance(Strict):
 
 
 class SourceEntry(Strict):
-    """One `[[source]]`: a required one must run; any one that runs must agree."""
+    """One `[[source]]`: a required one must run; any one that runs must agree.
 
-    name: SourceName = Field(pattern=r"^[a-z]+:\S+$")
+    `command`: a program of the user's that speaks the worker protocol, run in the model's folder; `{model}` in it is that
+    folder. Its description is the URDF if the name begins with `urdf:`, else the DH table.
+    """
+
+    name: SourceName = Field(pattern=r"^[A-Za-z][^\s\"]*$")
     required: bool = True
     tolerance: Tolerance | None = None
+    command: list[str] | None = Field(default=None, min_length=1)
+
+    @model_validator(mode="after")
+    def _an_engine_or_a_command(self) -> SourceEntry:
+        if self.command is None and ":" not in self.name:
+            raise ValueError(f"expected the name of an engine such as dh:pinocchio, or a command, got {self.name!r} alone")
+        return self
 
 
 class AcceptedEntry(Strict):
     """One `[[accepted]]` deviation: for each source and frame the largest discrepancy, right to within `within` (relative).
 
-    `position` [m] or `rotation` [rad] left out means: that part must be below tolerance.
+    `source` may be a pattern such as `urdf:*`: what is wrong in the URDF is wrong in every engine. `position` [m] or
+    `rotation` [rad] left out means: that part must be below tolerance.
     """
 
     source: SourceName | list[SourceName]
@@ -73,6 +89,10 @@ class AcceptedEntry(Strict):
     def sources(self) -> list[str]:
         """The sources as a list."""
         return [self.source] if isinstance(self.source, str) else self.source
+
+    def covers(self, source: str) -> bool:
+        """Whether this entry is about the source."""
+        return any(fnmatchcase(source, pattern) for pattern in self.sources)
 
     @property
     def frames(self) -> list[str]:
@@ -120,6 +140,7 @@ class RobotModel:
     urdf: Urdf | None
     frames: FrameMap
     urdf_joints: JointMap | None
+    engine_names: dict[str, EngineNames]
     configurations: ConfigurationSet
     findings: tuple[Finding, ...]
     suspects: tuple[SuspectNumber, ...]
@@ -188,11 +209,13 @@ def load_model(folder: Path) -> RobotModel:
         random_limits(table, urdf, joints),
         paths["configurations.toml"],
     )
+    known_joints = (*table.joints, *(urdf.movable if urdf else ()))
+    check_engine_names(frames_file.engine, frames, known_joints, table, paths["frames.toml"])
     _check_sources(file, frames, paths["model.toml"])
     hashes = {name: _sha256(path) for name, path in paths.items()}
     if file.urdf is not None and urdf_path is not None:
         hashes[f"{file.urdf.package or 'urdf'}:{file.urdf.file}"] = _sha256(urdf_path)
-    return RobotModel(folder, file, table, urdf, frames, joints, configurations, findings, suspects, hashes)
+    return RobotModel(folder, file, table, urdf, frames, joints, frames_file.engine, configurations, findings, suspects, hashes)
 
 
 def _check_sources(file: ModelFile, frames: FrameMap, path: Path) -> None:
@@ -200,18 +223,15 @@ def _check_sources(file: ModelFile, frames: FrameMap, path: Path) -> None:
     for i, entry in enumerate(file.source):
         if entry.name in names:
             raise ModelFileError(f"source {entry.name!r} is there twice", where=path, key=f"source[{i}].name")
-        if file.urdf is None and not entry.name.startswith("dh:"):
+        if file.urdf is None and entry.name.startswith("urdf:"):
             raise ModelFileError(f"{entry.name!r} needs a [urdf] table", where=path, key=f"source[{i}].name")
         names.append(entry.name)
     seen: set[tuple[str, str]] = set()
     for i, accepted in enumerate(file.accepted):
-        for kind, values, known in (
-            ("source", accepted.sources, names),
-            ("frame", accepted.frames, [f.name for f in frames.frames]),
-        ):
-            for value in values:
-                if value not in known:
-                    raise MappingError(f"no {kind} {value!r}; {nearest(value, known)}", where=path, key=f"accepted[{i}].{kind}")
+        known = [f.name for f in frames.frames]
+        for value in accepted.frames:
+            if value not in known:
+                raise MappingError(f"no frame {value!r}; {nearest(value, known)}", where=path, key=f"accepted[{i}].frame")
         for pair in ((s, f) for s in accepted.sources for f in accepted.frames):
             if pair in seen:
                 raise ModelFileError(f"{pair[0]} at {pair[1]} is accepted twice", where=path, key=f"accepted[{i}]")

@@ -48,14 +48,20 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Urdf:
-    """The kinematics of one URDF. `text` is what engines read. May be malformed as a tree: see `urdf_lint.check`."""
+class UrdfText:
+    """All that an engine is given: the XML, stripped to links and joints."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Urdf(UrdfText):
+    """The kinematics of one URDF. May be malformed as a tree: see `urdf_lint.check`."""
 
     path: Path
     name: str
     link_list: tuple[Link, ...]
     joint_list: tuple[UrdfJoint, ...]
-    text: str
 
     @cached_property
     def links(self) -> tuple[str, ...]:

@@ -59,7 +59,7 @@ def parse_urdf(data: bytes, path: Path) -> Urdf:
     if not links:
         raise UrdfError("expected at least one <link>, got none", where=path)
     text = etree.tostring(kept, encoding="unicode", pretty_print=True)
-    return Urdf(path, robot.get("name", ""), tuple(links), tuple(joints), text)
+    return Urdf(text, path, robot.get("name", ""), tuple(links), tuple(joints))
 
 
 def _root(data: bytes, path: Path) -> etree._Element:

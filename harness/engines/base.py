@@ -6,15 +6,15 @@ An adapter uses its library as users do and repairs nothing. What a library does
 from __future__ import annotations
 
 import importlib
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from types import ModuleType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
-from packaging.requirements import Requirement
 
 from harness.errors import EngineFailed, EngineUnavailable, nearest
 from harness.se3 import Array
@@ -36,14 +36,22 @@ class Trait:
 class Engine(ABC):
     """Forward kinematics of one description by one library.
 
-    Subclasses take the description in their constructor: a `DHTable` if `source` starts with `dh:`, a `Urdf` if with
-    `urdf:`. They set `joints` and `frames` in the library's own order and implement `_placements`. Importing a
-    subclass's module must not import the library: use `library()` in the constructor.
+    Subclasses take the description in their constructor: what `takes` says, by default a `DHTable` if `source` starts with
+    `dh:`, a `UrdfText` if with `urdf:`. They set `joints` and `frames` in the library's own order and implement `_placements`.
+    A subclass's module runs in environments that have little more than NumPy and the library: it imports nothing else of
+    third parties, and the library itself only in the constructor, through `library()`.
+
+    isolated: whether it runs in a process of its own. requirements: what pip installs. debian: packages of the system's own
+    Python instead, `imports` the modules they bring.
     """
 
-    source: ClassVar[str]
+    source: str
+    takes: ClassVar[Literal["", "table", "urdf", "packaged"]] = ""
+    isolated: ClassVar[bool] = True
     requirements: ClassVar[tuple[str, ...]] = ()
-    traits: ClassVar[tuple[Trait, ...]] = ()
+    debian: ClassVar[tuple[str, ...]] = ()
+    imports: ClassVar[tuple[str, ...]] = ()
+    traits: tuple[Trait, ...] = ()
     applies_mimic: ClassVar[bool] = False
 
     joints: tuple[str, ...]
@@ -78,38 +86,24 @@ class Engine(ABC):
 
     @classmethod
     def versions(cls) -> dict[str, str]:
-        """Installed version of each required distribution; those that are missing are left out."""
+        """Installed version of each required distribution in this environment; those that are missing are left out."""
         found = {}
         for requirement in cls.requirements:
-            name = Requirement(requirement).name
+            name = re.split(r"[^A-Za-z0-9._-]", requirement, maxsplit=1)[0]
             try:
                 found[name] = metadata.version(name)
             except metadata.PackageNotFoundError:
                 continue
         return found
 
-    @classmethod
-    def install_line(cls) -> str:
-        """The command that installs what this engine needs."""
-        return "pip install " + " ".join(f'"{r}"' if set(r) & set("<>=!~ ;[") else r for r in cls.requirements)
-
-    @classmethod
-    def check_requirements(cls) -> None:
-        """Raise EngineUnavailable if a distribution is missing or too old."""
-        found = cls.versions()
-        for text in cls.requirements:
-            need = Requirement(text)
-            have = found.get(need.name)
-            if have is None:
-                raise EngineUnavailable(cls.source, f"{need.name} is not installed", cls.install_line())
-            if not need.specifier.contains(have, prereleases=True):
-                raise EngineUnavailable(cls.source, f"needs {text}, found {need.name} {have}", cls.install_line())
+    def installed(self) -> dict[str, str]:
+        """Versions of the libraries this engine runs on."""
+        return self.versions()
 
     @classmethod
     def library(cls, module: str) -> ModuleType:
-        """Import the library. Raises EngineUnavailable with the install line."""
-        cls.check_requirements()
+        """Import the library. Raises EngineUnavailable if that fails."""
         try:
             return importlib.import_module(module)
         except ImportError as error:
-            raise EngineUnavailable(cls.source, f"import {module} failed: {error}", cls.install_line()) from error
+            raise EngineUnavailable(cls.source, f"import {module} failed: {error}") from error

@@ -62,6 +62,7 @@ class DHNumpy(Engine):
     """The in-house FK of a `DHTable`: standard and modified; revolute, prismatic and fixed rows; base and tool."""
 
     source = "dh:numpy"
+    isolated = False  # our own, and the yardstick: without it there is no run
     traits = (Trait("in-house", "vectorised DH product in float64", "harness/engines/dh_numpy.py"),)
 
     def __init__(self, description: DHTable) -> None:

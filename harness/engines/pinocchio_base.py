@@ -15,8 +15,8 @@ from harness.se3 import Array
 class PinocchioEngine(Engine):
     """Forward kinematics of a `pinocchio.Model`. Subclasses build `model` and name its frames."""
 
-    requirements = ("pin>=3.9",)
-    traits: ClassVar[tuple[Trait, ...]] = (
+    requirements: ClassVar[tuple[str, ...]] = ("pin>=3.9",)
+    traits: tuple[Trait, ...] = (
         Trait(
             "joints-alphabetical",
             "joints are ordered alphabetically below each link, not as written",

@@ -7,7 +7,10 @@ from functools import lru_cache
 from importlib import metadata
 
 from harness.description.model import RobotModel
+from harness.description.packaged import Packaged
+from harness.engines import requirements
 from harness.engines.base import Engine
+from harness.engines.protocol import Description
 from harness.errors import DescriptionUnavailable, EngineUnavailable, InputError, nearest
 
 GROUP = "fk_crosscheck.engines"
@@ -56,17 +59,31 @@ def adapter_of(source: str) -> type[Engine]:
     return entry.adapter
 
 
+def kind_of(source: str) -> str:
+    """Kind of description a source computes from: `urdf`, or `dh`, which a command without a prefix is taken for."""
+    return "urdf" if source.startswith("urdf:") else "dh"
+
+
+def description_of(source: str, model: RobotModel, takes: str = "") -> Description:
+    """What an engine of this name is given. Raises DescriptionUnavailable or EngineUnavailable if the model has none."""
+    if takes == "packaged":
+        names = model.engine_names.get(source)
+        if names is None or names.robot is None:
+            hint = f'in frames.toml, [engine."{source}"] robot = "..."'
+            raise EngineUnavailable(source, f"no packaged robot is named for {model.name}: {hint}")
+        return Packaged(names.robot, model.table.joints)
+    if kind_of(source) == "dh":
+        return model.table
+    if model.urdf is None:
+        raise DescriptionUnavailable(f"{source}: {model.name} has no URDF")
+    return model.urdf
+
+
 def load_engine(source: str, model: RobotModel) -> Engine:
-    """Build the engine `source` on the model's description.
+    """Build the engine `source` on the model's description, in this process.
 
     Raises InputError (unknown source), EngineUnavailable (not installed), EngineFailed (refuses the description).
     """
     adapter = adapter_of(source)
-    kind = source.partition(":")[0]
-    if kind == "dh":
-        return adapter(model.table)
-    if kind == "urdf":
-        if model.urdf is None:
-            raise DescriptionUnavailable(f"{source}: {model.name} has no URDF")
-        return adapter(model.urdf)
-    raise InputError(f"{source!r}: no description of kind {kind!r}; known: dh, urdf")
+    requirements.check(adapter)
+    return adapter(description_of(source, model, adapter.takes))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from harness.description.urdf import Urdf
+from harness.description.urdf import UrdfText
 from harness.engines.base import Trait
 from harness.engines.pinocchio_base import PinocchioEngine
 from harness.errors import EngineFailed
@@ -22,7 +22,7 @@ class UrdfPinocchio(PinocchioEngine):
         ),
     )
 
-    def __init__(self, description: Urdf) -> None:
+    def __init__(self, description: UrdfText) -> None:
         pin = self.library("pinocchio")
         try:
             model = pin.buildModelFromXML(description.text)

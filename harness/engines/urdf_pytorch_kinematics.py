@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from harness.description.urdf import Urdf
+from harness.description.urdf import UrdfText
 from harness.engines.base import Engine, Trait
 from harness.errors import EngineFailed
 from harness.se3 import Array
@@ -47,7 +47,7 @@ class UrdfPytorchKinematics(Engine):
         Trait("joints-depth-first", "joints are ordered depth first, not as written", "order jz1 jz2 ja1 ja2"),
     )
 
-    def __init__(self, description: Urdf) -> None:
+    def __init__(self, description: UrdfText) -> None:
         self._torch = self.library("torch")
         pk = self.library("pytorch_kinematics")
         try:

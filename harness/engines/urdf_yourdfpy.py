@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from harness.description.urdf import Urdf
+from harness.description.urdf import UrdfText
 from harness.engines.base import Engine, Trait
 from harness.errors import EngineFailed
 from harness.se3 import Array
@@ -40,7 +40,7 @@ class UrdfYourdfpy(Engine):
         ),
     )
 
-    def __init__(self, description: Urdf) -> None:
+    def __init__(self, description: UrdfText) -> None:
         yourdfpy = self.library("yourdfpy")
         try:
             self._robot = yourdfpy.URDF.load(

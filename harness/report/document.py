@@ -94,13 +94,16 @@ class TraitNote(Part):
 
 
 class Validity(Part):
-    """Placements checked for being placements: finite, last row 0 0 0 1, rotation in SO(3)."""
+    """Placements checked for being placements: finite, last row 0 0 0 1, rotation in SO(3); and for depending on q alone:
+    `again` is the largest change of an entry when a configuration, `again_at`, was asked for a second time."""
 
     checked: int
     invalid: int
     residual: NonNegative
     first: At | None = None
     first_frame: str = ""
+    again: NonNegative = 0.0
+    again_at: At | None = None
 
 
 class FrameBound(Part):
@@ -138,13 +141,16 @@ class Source(Part):
     required: bool
     reference: bool = False
     status: Literal["ran", "not run", "failed"]
-    verdict: Literal["reference", "agrees", "agrees as accepted", "disagrees", "invalid placements", "not run", "failed"]
+    verdict: Literal[
+        "reference", "agrees", "agrees as accepted", "disagrees", "invalid placements", "keeps state", "not run", "failed"
+    ]
     reason: str = ""
     install: str = ""
     tolerance: Tolerance
     joints: list[str] = []
     mimic: str = ""
     held: list[str] = []
+    mapping: str = ""
     traits: list[TraitNote] = []
     validity: Validity | None = None
     frames: list[FrameResult] = []
@@ -250,11 +256,16 @@ class Verdict(Part):
 
 
 class Environment(Part):
-    """What varies: times [s], versions, machine. Nothing outside this block does."""
+    """What varies: times [s], versions, machine. Nothing outside this block does.
+
+    loading: until every engine was there. engine_seconds: inside each engine; waiting_seconds: until its answers were here.
+    """
 
     created: str
     duration: NonNegative
+    loading: NonNegative = 0.0
     engine_seconds: dict[str, NonNegative]
+    waiting_seconds: dict[str, NonNegative] = {}
     versions: dict[str, dict[str, str]]
     harness: str
     python: str

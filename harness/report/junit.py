@@ -18,7 +18,7 @@ def render_junit(report: Report) -> str:
             suite.add_testcase(_not_run(report, source))
         for frame in source.frames:
             suite.add_testcase(_frame(report, source, frame))
-        if source.verdict == "invalid placements":
+        if source.verdict in ("invalid placements", "keeps state"):
             suite.add_testcase(_invalid(report, source))
     for claim in report.published:
         suite.add_testcase(_published(report, claim))
@@ -58,9 +58,11 @@ def _frame(report: Report, source: Source, frame: FrameResult) -> TestCase:
 
 
 def _invalid(report: Report, source: Source) -> TestCase:
-    case = _case(report, "placements are rigid transforms", source.name)
+    case = _case(report, "placements are rigid transforms that depend on q alone", source.name)
     if source.validity:
-        case.result = [Failure(f"{source.validity.invalid} of {source.validity.checked} are not")]
+        v = source.validity
+        again = f"; asked again, one changed by {v.again:.2g}"
+        case.result = [Failure(f"{v.invalid} of {v.checked} are no rigid transforms{again}")]
     return case
 
 

@@ -1,0 +1,153 @@
+"""Each engine seen through the model's mapping: asked by joint name, read by frame name, in the model's base frame."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness import se3
+from harness.analysis.components import View, components, mapped, matrices
+from harness.description.engine_names import placement_in_base
+from harness.description.frames import MappedFrame, unchecked_joint
+from harness.description.frames_file import EngineNames
+from harness.description.joints import JointMap
+from harness.description.model import RobotModel
+from harness.engines.base import Engine
+from harness.engines.process import ProcessEngine
+from harness.engines.registry import kind_of
+from harness.errors import EngineFailed, nearest
+from harness.se3 import Array
+
+
+@dataclass
+class Bound:
+    """An engine bound to a model: asked in the model's joint order, answering at the mapped frames.
+
+    `frames` are the engine's frame names that are read; `view` tells how mapped frames follow from them; `missing` are
+    indices of mapped frames the engine does not have, though its description does; `waited` is the time spent on its answers.
+    """
+
+    engine: Engine
+    joint_map: JointMap
+    frames: tuple[str, ...]
+    view: View
+    missing: tuple[int, ...] = ()
+    waited: float = 0.0
+
+    @property
+    def seconds(self) -> float:
+        """Time spent inside the engine [s]: as a worker measures it itself, if it does, else as seen from here."""
+        own = self.engine.seconds if isinstance(self.engine, ProcessEngine) else 0.0
+        return own or self.waited
+
+    def should_have(self, frame: int) -> bool:
+        """Whether the mapped frame with this index can be expected of this source: its description has it."""
+        return self.view.slots[frame] >= 0 or frame in self.missing
+
+    def raw(self, q: Array) -> Array:
+        """Placements as the engine returns them, q (N, n) in model order: (N, len(frames), 4, 4)."""
+        values = self.joint_map.values(q, self.engine.joints)
+        start = time.perf_counter()
+        try:
+            return self.engine.placements(values, self.frames)
+        finally:
+            self.waited += time.perf_counter() - start
+
+    def mapped(self, q: Array) -> dict[int, Array]:
+        """Placements (N, 4, 4) of each mapped frame this source has, by its index, at q (N, n)."""
+        T = matrices(mapped(components(self.raw(q)), self.view))
+        return {frame: T[:, i] for i, frame in enumerate(self.view.available)}
+
+
+def _label(frame: MappedFrame, kind: str, names: EngineNames) -> str | None:
+    """What an engine calls a mapped frame; None if its description does not have it."""
+    return names.frames.get(frame.name) or (frame.dh if kind == "dh" else frame.urdf)
+
+
+def _anchor(model: RobotModel, kind: str, names: EngineNames) -> MappedFrame | None:
+    """The frame in which placements are read; None if they are in the base frame as they come."""
+    if names.base is not None:
+        return next(f for f in model.frames.frames if f.name == names.base)
+    return model.frames.base if kind == "urdf" else None
+
+
+def wanted_frames(source: str, model: RobotModel) -> tuple[str, ...]:
+    """The engine's frames that binding it will read, as far as it has them."""
+    kind, names = kind_of(source), model.engine_names.get(source, EngineNames())
+    frames = [f for f in model.frames.frames if f.name not in names.without]
+    anchor = _anchor(model, kind, names)
+    labels = [_label(f, kind, names) for f in (*frames, *([anchor] if anchor else []))]
+    return tuple(dict.fromkeys(label for label in labels if label is not None))
+
+
+def bind(engine: Engine, model: RobotModel, offsets: Mapping[str, Array], partial: bool = False) -> Bound:
+    """Bind an engine to a model. `offsets` are the rigid offsets by frame name; an unmeasured one counts as none.
+
+    partial: it may have some of the frames only, as controllers do, if the last of them moves with every joint. Raises
+    EngineFailed for a frame or joint that is needed and not there, or there and unknown.
+    """
+    kind, names = kind_of(engine.source), model.engine_names.get(engine.source, EngineNames())
+    joint_map = model.joint_map(kind).renamed(names.joints)
+    if unknown := [j for j in engine.joints if j not in joint_map.names]:
+        raise EngineFailed(
+            engine.source,
+            f"has a joint {unknown[0]!r} that the description does not: {nearest(unknown[0], joint_map.names)}",
+        )
+    if lost := [j for j in joint_map.moved if j not in engine.joints and j not in joint_map.followers]:
+        raise EngineFailed(engine.source, f"has no joint {lost[0]!r}; {nearest(lost[0], engine.joints)}")
+    frames = model.frames.frames
+    labels = [None if f.name in names.without else _label(f, kind, names) for f in frames]
+    read = [x for x in dict.fromkeys(labels) if x is not None and x in engine.frames]
+    base, front = _base(engine, model, kind, names)
+    if base is not None and base not in read:
+        read.append(base)
+    slots = tuple(read.index(x) if x in read else -1 for x in labels)
+    missing = tuple(i for i, x in enumerate(labels) if x is not None and x not in read)
+    if partial:
+        if joint := unchecked_joint((f for f, slot in zip(frames, slots, strict=True) if slot >= 0), model.table):
+            raise EngineFailed(engine.source, f"has no frame that joint {joint!r} moves, among {', '.join(engine.frames)}")
+        missing = ()
+    constant = [_constant(f, kind, names, offsets) for f in frames]
+    view = View(slots, np.array(constant), None if base is None else read.index(base), front)
+    return Bound(engine, joint_map, tuple(read), view, missing)
+
+
+def _base(engine: Engine, model: RobotModel, kind: str, names: EngineNames) -> tuple[str | None, Array | None]:
+    """The engine's frame that placements are taken relative to, and T_base_frame if it is not the base frame itself."""
+    anchor = _anchor(model, kind, names)
+    if anchor is None:
+        return None, None
+    label = _label(anchor, kind, names)
+    if label is None or label not in engine.frames:
+        hint = f'name one that it has in frames.toml, [engine."{engine.source}"] base = ...'
+        raise EngineFailed(engine.source, f"does not have the base frame {label!r}; {hint}")
+    T = placement_in_base(anchor, model.frames.base, model.table)
+    return label, None if np.array_equal(T, np.eye(4)) else T
+
+
+def _constant(frame: MappedFrame, kind: str, names: EngineNames, offsets: Mapping[str, Array]) -> Array:
+    """Constant transform behind the frame that is read: a frame that is named as the engine has it needs none."""
+    if kind == "urdf" or frame.name in names.frames:
+        return np.eye(4)
+    return offsets.get(frame.name, np.eye(4)) if frame.offset is None else frame.offset
+
+
+def measure_rigid(model: RobotModel, in_house: Bound, urdf_source: Bound, q: Array) -> dict[str, Array]:
+    """Offset of each rigid frame, by frame name: the mean of T_dh_link = T_base_dh^-1 T_base_link over q (N, n).
+
+    A mean over evenly spread configurations, not one of them: an offset taken at one absorbs whatever discrepancy there is
+    at that one, and shows it doubled elsewhere. Rotations are averaged in the chordal sense, by projecting the mean matrix
+    on SO(3) (Moakher 2002, doi:10.1137/S0895479801383877). Frames whose placements are not finite are left out.
+    """
+    T_base_dh, T_base_link = in_house.mapped(q), urdf_source.mapped(q)
+    offsets = {}
+    for i, frame in enumerate(model.frames.frames):
+        if frame.relation == "rigid" and i in T_base_link and np.isfinite(T_base_link[i]).all():
+            mean = (se3.inverse(T_base_dh[i]) @ T_base_link[i]).mean(axis=0)
+            U, _, Vt = np.linalg.svd(mean[:3, :3])
+            mean[:3, :3] = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+            offsets[frame.name] = mean
+    return offsets

@@ -1,0 +1,37 @@
+"""Whether an environment has what an adapter needs, and the line that installs it."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+
+from packaging.requirements import Requirement
+
+from harness.engines.base import Engine
+from harness.errors import EngineUnavailable
+
+
+def install_line(adapter: type[Engine]) -> str:
+    """The command that gives this engine an environment of its own; it works beside any other engine."""
+    return f"crosscheck engines install {shlex.quote(adapter.source)}"
+
+
+def unmet(adapter: type[Engine], found: Mapping[str, str]) -> str:
+    """The first requirement that `found` (distribution: version) does not meet, as a clause; empty if it meets all."""
+    for text in adapter.requirements:
+        need = Requirement(text)
+        have = found.get(need.name)
+        if have is None:
+            return f"{need.name} is not installed"
+        if not need.specifier.contains(have, prereleases=True):
+            return f"needs {text}, found {need.name} {have}"
+    return ""
+
+
+def check(adapter: type[Engine]) -> None:
+    """Raise EngineUnavailable unless this environment has what the adapter needs."""
+    if adapter.debian:
+        reason = f"needs the system's Python with {' and '.join(adapter.debian)}"
+        raise EngineUnavailable(adapter.source, reason, install_line(adapter))
+    if why := unmet(adapter, adapter.versions()):
+        raise EngineUnavailable(adapter.source, why, install_line(adapter))

@@ -1,0 +1,48 @@
+"""What a cross-check is asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from harness.engines.process import Limits
+from harness.engines.registry import REFERENCE
+from harness.errors import InputError
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a cross-check is asked to do. `sources` empty: those of model.toml. `command` is shown as how to reproduce.
+
+    workers: (name, command) of programs that speak the worker protocol. all_engines: also every engine that model.toml does
+    not list. jobs: workers that compute at a time, 0 for one a core. in_process: engines run here, not in workers.
+    """
+
+    samples: int = 2000
+    seed: int = 0
+    sources: tuple[str, ...] = ()
+    reference: str = REFERENCE
+    command: str = ""
+    certify: bool = True
+    all_engines: bool = False
+    workers: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    limits: Limits = field(default_factory=Limits)
+    jobs: int = 0
+    in_process: bool = False
+
+    def reproduced_by(self, command: str) -> Options:
+        """The same options, with the command line that reproduces them."""
+        return replace(self, command=command)
+
+    def __post_init__(self) -> None:
+        """Refuse impossible numbers. Raises InputError."""
+        if self.samples < 0:
+            raise InputError(f"expected samples >= 0, got {self.samples}")
+        if not 0 <= self.seed < 2**64:
+            raise InputError(f"expected 0 <= seed < 2^64, got {self.seed}")
+        if self.jobs < 0:
+            raise InputError(f"expected jobs >= 0, got {self.jobs}")
+        for name, value in (("start timeout", self.limits.start), ("block timeout", self.limits.block)):
+            if not value > 0.0:
+                raise InputError(f"expected a {name} > 0 s, got {value}")
+        if self.limits.memory <= 0:
+            raise InputError(f"expected a memory limit > 0, got {self.limits.memory}")

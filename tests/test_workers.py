@@ -1,0 +1,153 @@
+"""Engines in processes of their own: every way one can fail is its result, the run goes on, and nothing is left behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+
+from harness.crosscheck import crosscheck
+from harness.description.model import RobotModel, load_model
+from harness.engines.process import Limits
+from harness.options import Options
+from harness.report.document import Report, Source
+from harness.report.files import write_report
+from harness.report.json_file import read_report
+
+WORKER = str(Path(__file__).parent / "faulty_worker.py")
+LIMITS = Limits(start=5.0, block=5.0, memory=400 << 20)
+SAMPLES = 9000  # three blocks
+
+
+def with_fault(model: RobotModel, fault: str, **options: object) -> Report:
+    workers = (("controller", (sys.executable, WORKER, fault)),)
+    sources = ("dh:pinocchio",)
+    defaults = {"samples": SAMPLES, "sources": sources, "workers": workers, "limits": LIMITS, "certify": False}
+    return crosscheck(model, Options(**{**defaults, **options}))  # type: ignore[arg-type]
+
+
+def named(report: Report, name: str) -> Source:
+    return next(s for s in report.sources if s.name == name)
+
+
+def below() -> list[psutil.Process]:
+    """What this process has started and what runs on, directly or further down."""
+    return [p for p in psutil.Process().children(recursive=True) if p.status() != psutil.STATUS_ZOMBIE]
+
+
+@pytest.fixture(autouse=True)
+def _nothing_left() -> Iterator[None]:
+    before = {p.pid for p in below()}
+    yield
+    left = [p for p in below() if p.pid not in before]
+    assert not left, [p.cmdline() for p in left]
+
+
+@pytest.mark.parametrize(
+    ("fault", "verdict", "code", "reason"),
+    [
+        ("none", "agrees", 0, ""),
+        ("floods stderr", "agrees", 0, ""),
+        ("does not end", "agrees", 0, ""),
+        ("exits at once", "failed", 3, "at the start: exited with code 7; stderr ends: no licence found"),
+        ("sleeps at the start", "failed", 3, "at the start: did not answer within 5 s"),
+        ("sleeps at the start with a child", "failed", 3, "at the start: did not answer within 5 s"),
+        ("prints rubbish", "failed", 3, "got 'Loading controller firmware v3 ...': does it print to stdout?"),
+        ("refuses", "failed", 3, "this controller is for another robot"),
+        ("another version", "failed", 3, "version: expected 1, the version this harness speaks, got 2"),
+        ("no end of line", "failed", 3, "expected one line of JSON, got"),
+        ("exits in a block", "failed", 3, "exited with code 3 after 108 of"),
+        ("segfaults", "failed", 3, "killed by SIGSEGV (Segmentation fault); stderr ends: about to read address 0"),
+        ("aborts", "failed", 3, "killed by SIGABRT (Aborted)"),
+        ("sleeps in a block", "failed", 3, "did not answer within 5 s"),
+        ("prints in a block", "failed", 3, "expected the count 823, got 'warning:': does it print to stdout?"),
+        ("closes stdout", "failed", 3, "closed its stdout and went on running"),
+        ("allocates without end", "failed", 3, "GiB of memory, 0.4 GiB are allowed"),
+        ("allocates in a child", "failed", 3, "GiB of memory, 0.4 GiB are allowed"),
+        ("reports a failure", "failed", 3, "joint 3 outside its limits"),
+        ("big-endian", "failed", 3, "write little-endian"),
+        ("float32", "failed", 3, "expected the count 4096 as float64, got it as float32"),
+        ("too few frames", "failed", 3, "did not answer within 5 s after"),
+        ("too many frames", "failed", 3, "bytes more than it was asked for"),
+        ("nan", "invalid placements", 1, ""),
+        ("not a rotation", "invalid placements", 1, ""),
+        ("column-major", "invalid placements", 1, ""),
+        ("the previous block", "keeps state", 1, ""),
+    ],
+)
+def test_faults(models: dict[str, RobotModel], tmp_path: Path, fault: str, verdict: str, code: int, reason: str) -> None:
+    """The right verdict, in bounded time; the other source is compared, the report is complete."""
+    start = time.monotonic()
+    report = with_fault(models["ur3"], fault)
+    assert time.monotonic() - start < 60.0
+    controller = named(report, "controller")
+    assert (controller.verdict, report.verdict.exit_code) == (verdict, code)
+    assert reason in controller.reason
+    if verdict == "failed" and "at the start" not in reason and "version" not in reason and "block" in fault:
+        assert "(configurations 8192 to 9014)" in controller.reason
+    assert named(report, "dh:pinocchio").verdict == "agrees"
+    write_report(report, tmp_path)
+    assert read_report(tmp_path / "ur3.json") == report
+
+
+def test_an_optional_one_that_fails_does_not_fail_the_gate_and_is_named(copy_model: Callable[..., Path]) -> None:
+    command = f'command = ["{sys.executable}", "{WORKER}", "exits at once"]'
+    text = f'[[source]]\nname = "controller"\nrequired = false\n{command}\n\n[[source]]\nname = "dh:pinocchio"\n'
+    folder = copy_model("ur3", ("model.toml", '[[source]]\nname = "dh:pinocchio"\n', text))
+    report = crosscheck(load_model(folder), Options(100, certify=False))
+    assert report.verdict.exit_code == 0
+    assert "failed: controller" in report.verdict.sentence
+    assert "no licence found" in named(report, "controller").reason
+
+
+def test_a_failing_reference_leaves_nothing_verified(models: dict[str, RobotModel]) -> None:
+    report = with_fault(models["ur3"], "aborts", reference="controller")
+    assert report.verdict.exit_code == 3
+    assert "SIGABRT" in report.verdict.sentence
+
+
+def test_a_command_that_is_not_there(models: dict[str, RobotModel]) -> None:
+    report = with_fault(models["ur3"], "", workers=(("controller", ("no-such-program",)),))
+    assert "cannot start 'no-such-program'" in named(report, "controller").reason
+    assert report.verdict.exit_code == 3
+
+
+def descendants(pid: int) -> list[psutil.Process]:
+    return psutil.Process(pid).children(recursive=True)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("fault", ["sleeps in a block", "sleeps at the start with a child"])
+def test_no_orphan_however_the_harness_ends(tmp_path: Path, number: signal.Signals, fault: str) -> None:
+    worker = f"controller={sys.executable} {WORKER} '{fault}'"
+    command = [sys.executable, "-m", "harness", "run", "ur3", "--samples", "20000", "--worker", worker]
+    harness = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True)
+    try:
+        wanted = 7 if "child" in fault else 6  # four engines, the controller and the warden; and the controller's child
+        wait_for(lambda: len(descendants(harness.pid)) >= wanted)
+        time.sleep(1.0)
+        started = descendants(harness.pid)
+        assert any(WORKER in " ".join(p.cmdline()) for p in started)
+        os.kill(harness.pid, number)
+        harness.wait(20.0)
+        wait_for(lambda: not [p for p in started if p.is_running() and p.status() != psutil.STATUS_ZOMBIE])
+    finally:
+        harness.kill()
+        _, error = harness.communicate()
+    if number == signal.SIGINT:
+        assert harness.returncode == 130
+        assert error.decode().strip() == "interrupted: reports written before are unchanged"
+
+
+def wait_for(condition: Callable[[], bool], seconds: float = 30.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.05)
