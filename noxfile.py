@@ -1,4 +1,4 @@
-"""Every step of CI, to be run at home: `nox -s crosscheck`, `tests`, `matrix`, `lint`, `types`, `bench`."""
+"""Every step of CI, to be run at home: `nox -s crosscheck`, `tests`, `engines`, `cpp`, `matrix`, `lint`, `types`, `bench`."""
 
 from __future__ import annotations
 
@@ -50,6 +50,29 @@ def tests(session: nox.Session) -> None:
     """The test suite on this Python with the newest pin."""
     session.install(CONSTRAINTS, f"pin=={NEWEST_PIN}", "--editable", ".[all,test]")
     session.run("pytest", *session.posargs)
+
+
+@nox.session
+def engines(session: nox.Session) -> None:
+    """Every engine there is, in its own environment: install them, try each case by case, cross-check all robots."""
+    session.install(CONSTRAINTS, f"pin=={NEWEST_PIN}", "--editable", ".[all,test]")
+    # 3: one could not be installed here. The cases below then fail for it, the table of the run tells why.
+    session.run("crosscheck", "engines", "install", "--all", CONSTRAINTS, success_codes=[0, 3])
+    session.run("pytest", "-q", "tests/test_engines.py", env={"CROSSCHECK_TESTS_ENGINES": "all"})
+    session.run("crosscheck", "run", "--all-engines", "--samples", "10000", "--out", "reports", *session.posargs)
+
+
+@nox.session
+def cpp(session: nox.Session) -> None:
+    """The C++ controller: build it, run its tests, cross-check it. Needs CMake, a C++17 compiler, Eigen and GoogleTest."""
+    session.install(CONSTRAINTS, f"pin=={NEWEST_PIN}", ".[pinocchio,robots,test]")
+    build = Path(session.create_tmp()).resolve() / "build"
+    source = "examples/cpp_controller"
+    session.run("cmake", "-S", source, "-B", str(build), external=True)
+    session.run("cmake", "--build", str(build), "--parallel", "2", external=True)
+    session.run("ctest", "--test-dir", str(build), "--output-on-failure", external=True)
+    session.run("crosscheck", "worker-check", "--", str(build / "fk_worker"), "{model}/dh.csv")
+    session.run("pytest", "-q", f"{source}/tests/test_crosscheck.py", env={"FK_WORKER": str(build / "fk_worker")})
 
 
 @nox.session(python=found_pythons())

@@ -169,9 +169,8 @@ def _traits(results: Results, source: str) -> list[doc.TraitNote]:
 
 def _joint_notes(results: Results, bound: Bound) -> dict[str, object]:
     """What the engine was given for mimic followers, and which joints were held at zero."""
-    names = results.model.engine_names.get(bound.engine.source)
-    mapping = [f"placements read in {names.base}"] if names and names.base else []
-    mapping += [f"without {', '.join(names.without)}"] if names and names.without else []
+    mapping = [f"placements read in {bound.read_in}"] if bound.read_in else []
+    mapping += [f"without {', '.join(bound.absent)}"] if bound.absent else []
     held = [j for j in bound.joint_map.held if j in bound.engine.joints]
     followers = bound.joint_map.followers
     if not followers:

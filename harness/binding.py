@@ -27,7 +27,8 @@ class Bound:
     """An engine bound to a model: asked in the model's joint order, answering at the mapped frames.
 
     `frames` are the engine's frame names that are read; `view` tells how mapped frames follow from them; `missing` are
-    indices of mapped frames the engine does not have, though its description does; `waited` is the time spent on its answers.
+    indices of mapped frames the engine does not have, though its description does; `absent` those it need not have; `read_in`
+    the frame its placements are read in, if not the base frame; `waited` is the time spent on its answers.
     """
 
     engine: Engine
@@ -35,6 +36,8 @@ class Bound:
     frames: tuple[str, ...]
     view: View
     missing: tuple[int, ...] = ()
+    absent: tuple[str, ...] = ()
+    read_in: str = ""
     waited: float = 0.0
 
     @property
@@ -62,70 +65,74 @@ class Bound:
         return {frame: T[:, i] for i, frame in enumerate(self.view.available)}
 
 
+def wanted_frames(source: str, model: RobotModel) -> tuple[str, ...]:
+    """The engine's frames that binding it will read, as far as it has them."""
+    kind, names = kind_of(source), model.engine_names.get(source, EngineNames())
+    labels = [_label(f, kind, names) for f in model.frames.frames if f.name not in names.without]
+    return tuple(dict.fromkeys(label for label in labels if label is not None))
+
+
+def bind(engine: Engine, model: RobotModel, offsets: Mapping[str, Array]) -> Bound:
+    """Bind an engine to a model. `offsets` are the rigid offsets by frame name; an unmeasured one counts as none.
+
+    Raises EngineFailed for a frame or joint that is needed and not there, or there and unknown.
+    """
+    kind, names = kind_of(engine.source), model.engine_names.get(engine.source, EngineNames())
+    joint_map = model.joint_map(kind).renamed(names.joints)
+    _check_joints(engine, joint_map)
+    frames = model.frames.frames
+    labels = [None if f.name in names.without else _label(f, kind, names) for f in frames]
+    read = [x for x in dict.fromkeys(labels) if x is not None and x in engine.frames]
+    slots = tuple(read.index(x) if x in read else -1 for x in labels)
+    missing = tuple(i for i, x in enumerate(labels) if x is not None and x not in read)
+    absent = [f.name for f in frames if f.name in names.without]
+    if engine.partial:
+        if joint := unchecked_joint((f for f, slot in zip(frames, slots, strict=True) if slot >= 0), model.table):
+            raise EngineFailed(engine.source, f"has no frame that joint {joint!r} moves, among {', '.join(engine.frames)}")
+        absent += [frames[i].name for i in missing]
+        missing = ()
+    constant = np.array([_constant(f, kind, names, offsets) for f in frames])
+    anchor = _anchor(engine, model, kind, names)
+    view = View(slots, constant, None)
+    if anchor is not None:
+        T = placement_in_base(anchor, model.frames.base, model.table)
+        base = read.index(str(_label(anchor, kind, names)))
+        view = View(slots, constant, base, None if np.array_equal(T, np.eye(4)) else T)
+    read_in = "" if anchor in (None, model.frames.base) else anchor.name if anchor else ""
+    return Bound(engine, joint_map, tuple(read), view, missing, tuple(absent), read_in)
+
+
 def _label(frame: MappedFrame, kind: str, names: EngineNames) -> str | None:
     """What an engine calls a mapped frame; None if its description does not have it."""
     return names.frames.get(frame.name) or (frame.dh if kind == "dh" else frame.urdf)
 
 
-def _anchor(model: RobotModel, kind: str, names: EngineNames) -> MappedFrame | None:
-    """The frame in which placements are read; None if they are in the base frame as they come."""
-    if names.base is not None:
-        return next(f for f in model.frames.frames if f.name == names.base)
-    return model.frames.base if kind == "urdf" else None
-
-
-def wanted_frames(source: str, model: RobotModel) -> tuple[str, ...]:
-    """The engine's frames that binding it will read, as far as it has them."""
-    kind, names = kind_of(source), model.engine_names.get(source, EngineNames())
-    frames = [f for f in model.frames.frames if f.name not in names.without]
-    anchor = _anchor(model, kind, names)
-    labels = [_label(f, kind, names) for f in (*frames, *([anchor] if anchor else []))]
-    return tuple(dict.fromkeys(label for label in labels if label is not None))
-
-
-def bind(engine: Engine, model: RobotModel, offsets: Mapping[str, Array], partial: bool = False) -> Bound:
-    """Bind an engine to a model. `offsets` are the rigid offsets by frame name; an unmeasured one counts as none.
-
-    partial: it may have some of the frames only, as controllers do, if the last of them moves with every joint. Raises
-    EngineFailed for a frame or joint that is needed and not there, or there and unknown.
-    """
-    kind, names = kind_of(engine.source), model.engine_names.get(engine.source, EngineNames())
-    joint_map = model.joint_map(kind).renamed(names.joints)
+def _check_joints(engine: Engine, joint_map: JointMap) -> None:
     if unknown := [j for j in engine.joints if j not in joint_map.names]:
-        raise EngineFailed(
-            engine.source,
-            f"has a joint {unknown[0]!r} that the description does not: {nearest(unknown[0], joint_map.names)}",
-        )
+        hint = nearest(unknown[0], joint_map.names)
+        raise EngineFailed(engine.source, f"has a joint {unknown[0]!r} that the description does not: {hint}")
     if lost := [j for j in joint_map.moved if j not in engine.joints and j not in joint_map.followers]:
         raise EngineFailed(engine.source, f"has no joint {lost[0]!r}; {nearest(lost[0], engine.joints)}")
+
+
+def _anchor(engine: Engine, model: RobotModel, kind: str, names: EngineNames) -> MappedFrame | None:
+    """The frame relative to which placements are read; None if they are in the base frame as they come.
+
+    The one that frames.toml names; else, for a URDF, the base frame, or the first frame at a declared offset from it that
+    the engine has.
+    """
     frames = model.frames.frames
-    labels = [None if f.name in names.without else _label(f, kind, names) for f in frames]
-    read = [x for x in dict.fromkeys(labels) if x is not None and x in engine.frames]
-    base, front = _base(engine, model, kind, names)
-    if base is not None and base not in read:
-        read.append(base)
-    slots = tuple(read.index(x) if x in read else -1 for x in labels)
-    missing = tuple(i for i, x in enumerate(labels) if x is not None and x not in read)
-    if partial:
-        if joint := unchecked_joint((f for f, slot in zip(frames, slots, strict=True) if slot >= 0), model.table):
-            raise EngineFailed(engine.source, f"has no frame that joint {joint!r} moves, among {', '.join(engine.frames)}")
-        missing = ()
-    constant = [_constant(f, kind, names, offsets) for f in frames]
-    view = View(slots, np.array(constant), None if base is None else read.index(base), front)
-    return Bound(engine, joint_map, tuple(read), view, missing)
-
-
-def _base(engine: Engine, model: RobotModel, kind: str, names: EngineNames) -> tuple[str | None, Array | None]:
-    """The engine's frame that placements are taken relative to, and T_base_frame if it is not the base frame itself."""
-    anchor = _anchor(model, kind, names)
-    if anchor is None:
-        return None, None
-    label = _label(anchor, kind, names)
-    if label is None or label not in engine.frames:
-        hint = f'name one that it has in frames.toml, [engine."{engine.source}"] base = ...'
-        raise EngineFailed(engine.source, f"does not have the base frame {label!r}; {hint}")
-    T = placement_in_base(anchor, model.frames.base, model.table)
-    return label, None if np.array_equal(T, np.eye(4)) else T
+    if names.base is not None:
+        fit = [f for f in frames if f.name == names.base]
+    elif kind == "dh":
+        return None
+    else:
+        fit = [model.frames.base, *(f for f in frames if f.dh in ("base", "0") and f.offset is not None)]
+        fit = [f for f in fit if f.name not in names.without]
+    for frame in fit:
+        if _label(frame, kind, names) in engine.frames:
+            return frame
+    raise EngineFailed(engine.source, f"has none of the frames that stand still: {', '.join(f.name for f in fit)}")
 
 
 def _constant(frame: MappedFrame, kind: str, names: EngineNames, offsets: Mapping[str, Array]) -> Array:

@@ -89,7 +89,7 @@ def _names(engine: ProcessEngine, model: RobotModel) -> Finding:
     """Whether it uses the names of the robot model."""
     what = f"knows the joints and frames of {model.name}"
     try:
-        bind(engine, model, {}, partial=True)
+        bind(engine, model, {})
     except EngineFailed as error:
         return Finding(what, f'{error.reason}; other names can be given in frames.toml, [engine."{engine.source}"]')
     return Finding(what)

@@ -133,21 +133,22 @@ def run(
     codes: list[int] = []
     names: dict[str, Path] = {}
     reports: list[Report] = []
-    for folder in folders:
-        try:
-            model = load_model(folder)
-            if model.name in names:
-                raise InputError(f"robot name {model.name!r} is also that of {names[model.name]}", where=folder)
-            names[model.name] = folder
-            with _progress(model.name, quiet or as_json) as advance:
-                report = crosscheck(model, options.reproduced_by(_command(folder, models, options)), advance)
-            write_report(report, out)
-            _tell(report, quiet, as_json)
-            reports.append(report)
-            codes.append(report.verdict.exit_code)
-        except CrosscheckError as error:  # this robot's input is wrong: the others are still checked
-            complain(error)
-            codes.append(error.exit_code)
+    with options.workshop() as workshop:
+        for folder in folders:
+            try:
+                model = load_model(folder)
+                if model.name in names:
+                    raise InputError(f"robot name {model.name!r} is also that of {names[model.name]}", where=folder)
+                names[model.name] = folder
+                with _progress(model.name, quiet or as_json) as advance:
+                    report = crosscheck(model, options.reproduced_by(_command(folder, models, options)), advance, workshop)
+                write_report(report, out)
+                _tell(report, quiet, as_json)
+                reports.append(report)
+                codes.append(report.verdict.exit_code)
+            except CrosscheckError as error:  # this robot's input is wrong: the others are still checked
+                complain(error)
+                codes.append(error.exit_code)
     write_index(out)
     if not quiet and not as_json:
         if all_engines:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from functools import partial
 
@@ -24,16 +25,18 @@ from harness.sources import Participant, Planned, pair_tolerance, plan
 from harness.streaming import Progress, compare
 
 
-def crosscheck(model: RobotModel, options: Options, progress: Progress | None = None) -> Report:
+def crosscheck(model: RobotModel, options: Options, progress: Progress | None = None, workers: Workers | None = None) -> Report:
     """Cross-check one robot model: every planned source against the reference at every mapped frame.
 
-    `progress(done, total)` is called after each block of configurations. Raises InputError for wrong options; a missing
+    `progress(done, total)` is called after each block of configurations. `workers`, if given, are used and left open, so that
+    the next robot need not start them again. Raises InputError for wrong options; a missing
     or failing engine is part of the report.
     """
     started = time.perf_counter()
     participants = [Participant(planned) for planned in plan(model, options)]
     results = Results(model, options, participants)
-    with Workers(options.limits, options.jobs, options.in_process) as workers:
+    with contextlib.ExitStack() as stack:
+        workers = workers or stack.enter_context(options.workshop())
         _bind_all(results, workers)
         results.loaded_in = time.perf_counter() - started
         results.comparison = compare(results, workers, progress)
@@ -41,6 +44,9 @@ def crosscheck(model: RobotModel, options: Options, progress: Progress | None = 
             results.reproduced = _reproduce(results, results.comparison)
             if options.certify:
                 results.certified = certify_all(results, workers)
+        for participant in participants:
+            if participant.bound is not None:
+                workers.release(participant.bound.engine)
     results.seconds = time.perf_counter() - started
     return assemble(results)
 
@@ -66,7 +72,7 @@ def _bind_all(results: Results, workers: Workers) -> None:
     for participant, task in tasks:
         try:
             engine = engines[participant.name] = task.result()
-            participant.bound = bind(engine, model, {}, bool(participant.planned.command))
+            participant.bound = bind(engine, model, {})
             if needs_measuring and not results.offsets and kind_of(participant.name) == "urdf":
                 results.offsets = measure_rigid(model, in_house, participant.bound, q)
                 results.measured_from = participant.name
@@ -74,8 +80,7 @@ def _bind_all(results: Results, workers: Workers) -> None:
             participant.fail(error)
     for participant in results.participants:
         if participant.bound is not None:
-            partial_frames = bool(participant.planned.command)
-            participant.bound = bind(engines[participant.name], model, results.offsets, partial_frames)
+            participant.bound = bind(engines[participant.name], model, results.offsets)
     results.in_house = bind(DHNumpy(model.table), model, results.offsets)
 
 

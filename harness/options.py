@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 from harness.engines.process import Limits
 from harness.engines.registry import REFERENCE
+from harness.engines.workers import Workers
 from harness.errors import InputError
 
 
@@ -32,6 +33,10 @@ class Options:
     def reproduced_by(self, command: str) -> Options:
         """The same options, with the command line that reproduces them."""
         return replace(self, command=command)
+
+    def workshop(self) -> Workers:
+        """Workers as these options want them."""
+        return Workers(self.limits, self.jobs, self.in_process)
 
     def __post_init__(self) -> None:
         """Refuse impossible numbers. Raises InputError."""

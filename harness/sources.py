@@ -78,6 +78,8 @@ def plan(model: RobotModel, options: Options) -> list[Planned]:
             raise InputError(f"{model.name} has no [urdf] table for it", key=name)
         required = name in (*asked, REFERENCE) or (entry is not None and entry.required)
         tolerance = (entry and entry.tolerance) or model.file.tolerance
+        if entry is None and name not in commands:
+            tolerance = _no_finer_than(tolerance, name)
         folder = None if name in dict(options.workers) else model.folder
         planned.append(Planned(name, required, tolerance, commands.get(name, ()), folder))
     if len(planned) < 2:
@@ -87,6 +89,15 @@ def plan(model: RobotModel, options: Options) -> list[Planned]:
         )
     _check_accepted(model, {*entries, *commands, *registered()})
     return planned
+
+
+def _no_finer_than(tolerance: Tolerance, name: str) -> Tolerance:
+    """The tolerance of an engine that model.toml does not list: its own resolution counts, if it is coarser."""
+    try:
+        finest = adapter_of(name).resolution
+    except EngineUnavailable:  # broken, and will say so itself
+        return tolerance
+    return Tolerance(position=max(tolerance.position, finest), rotation=max(tolerance.rotation, finest))
 
 
 def _check_known(name: str, commands: Mapping[str, tuple[str, ...]]) -> None:

@@ -6,7 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -14,6 +14,7 @@ from hypothesis import settings
 
 from harness.description.locate import default_models_dir
 from harness.description.model import RobotModel, load_model
+from tests.helpers import shared_workers
 
 # In CI the same examples every time: a rare one found there would fail a change that did not cause it.
 settings.register_profile("default", deadline=None, max_examples=50, derandomize=bool(os.environ.get("CI")))
@@ -48,6 +49,12 @@ def copy_model(tmp_path: Path) -> Callable[..., Path]:
         return models / robot
 
     return copy
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _end_shared_workers() -> Iterator[None]:
+    with shared_workers():
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -2,14 +2,31 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
 from hypothesis import strategies as st
 
+from harness import crosscheck as module
 from harness import se3
 from harness.description.dh import DHRow, DHTable
+from harness.description.model import RobotModel
+from harness.engines.workers import Workers
+from harness.options import Options
+from harness.report.document import Report
 from harness.se3 import Array
+
+
+@functools.cache
+def shared_workers() -> Workers:
+    """Workers that serve one test after the other, as they serve one robot after the other in a run."""
+    return Workers()
+
+
+def crosscheck(model: RobotModel, options: Options) -> Report:
+    """`harness.crosscheck.crosscheck` without starting every engine anew."""
+    return module.crosscheck(model, options, None, shared_workers())
 
 
 def assert_placements_close(got: Array, expected: Array, atol: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import sys
 from pathlib import Path
 
 import pytest
@@ -67,12 +68,39 @@ def test_there_is_no_cycle() -> None:
 
 def test_engine_modules_do_not_import_their_library() -> None:
     """Listing the engines must work, and be quick, with none of them installed."""
-    heavy = {"pinocchio", "torch", "pytorch_kinematics", "yourdfpy"}
+    heavy = {"pinocchio", "torch", "pytorch_kinematics", "yourdfpy", "mujoco", "pydrake", "urchin", "kinpy", "ikpy", "placo"}
+    heavy |= {"frax", "jax", "idyntree", "sympy", "roboticstoolbox", "spatialmath", "PyKDL"}
     for path in ROOT.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             assert not heavy & {name.split(".")[0] for name in names}, path
+
+
+def closure(start: Path) -> set[Path]:
+    """A module and everything of ours that it imports, directly or not."""
+    found, todo = set(), [start]
+    while todo:
+        path = todo.pop()
+        if path not in found:
+            found.add(path)
+            files = (ROOT.parent / Path(*name.split(".")).with_suffix(".py") for name in imports(path))
+            todo += [file for file in files if file.is_file()]
+    return found
+
+
+ADAPTERS = sorted(p for p in (ROOT / "engines").glob("*.py") if p.name.startswith(("dh_", "urdf_")))
+
+
+@pytest.mark.parametrize("path", [*ADAPTERS, ROOT / "engines" / "worker.py"], ids=lambda p: p.stem)
+def test_a_worker_needs_numpy_and_the_library_alone(path: Path) -> None:
+    """Its environment may be the system's Python, or one that holds versions of its own of whatever the harness needs."""
+    allowed = {*sys.stdlib_module_names, "numpy", "harness"}
+    for module in closure(path):
+        for node in ast.walk(ast.parse(module.read_text())):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            assert {name.split(".")[0] for name in names} <= allowed, f"{path.name} needs {names} of {module.name}"
 
 
 def test_modules_hold_one_idea() -> None:

@@ -15,7 +15,6 @@ from harness.analysis.certify import Evaluate, ascend, certify, found_from, lebe
 from harness.analysis.interpolation import Axis, coefficient_sum, grid, weights
 from harness.analysis.links import Link, certify_links, sample_links
 from harness.certificates import chain_links
-from harness.crosscheck import crosscheck
 from harness.description.dh import DHRow, DHTable
 from harness.description.model import RobotModel, load_model
 from harness.engines import registry
@@ -26,6 +25,7 @@ from harness.joint_axes import UncertifiableError, joint_axes
 from harness.options import Options
 from harness.report.document import Certificate, Report
 from harness.se3 import Array, chord_angle
+from tests.helpers import crosscheck
 
 TURN = Axis(True, 1, 0.0, 2 * math.pi)
 SLIDE = Axis(False, 1, -0.5, 1.0)

@@ -316,7 +316,7 @@ def test_a_third_partys_engine_joins_through_its_entry_point(cli: Cli, tmp_path:
     assert "dh:bad broken: entry point acme_nowhere:Bad: ModuleNotFoundError" in listed.stdout
     result = cli("run", "ur5", "--source", "dh:acme", "--samples", "10", "--json", **path)
     assert result.returncode == 0
-    assert json.loads(result.stdout)["environment"]["versions"]["dh:acme"] == {"acme-fk": "1.0"}
+    assert json.loads(result.stdout)["environment"]["versions"]["dh:acme"]["acme-fk"] == "1.0"
     broken = cli("run", "ur5", "--source", "dh:bad", "--samples", "10", **path)
     assert broken.returncode == 3
     assert "dh:bad is required and not run: entry point acme_nowhere:Bad" in broken.stdout

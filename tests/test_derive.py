@@ -20,7 +20,6 @@ from harness.analysis.canonical import canonical
 from harness.analysis.screws import Chain, adjoint, exp, fit_gauge, log, rebuild, screws
 from harness.binding import bind
 from harness.cli_derive import verify
-from harness.crosscheck import crosscheck
 from harness.derive import derive
 from harness.description.dh import Convention, DHRow, DHTable
 from harness.description.model import RobotModel, load_model
@@ -33,7 +32,7 @@ from harness.errors import InputError, UrdfError
 from harness.options import Options
 from harness.se3 import Array
 from harness.write_model import export_urdf
-from tests.helpers import assert_placements_close, tables, transforms
+from tests.helpers import assert_placements_close, crosscheck, tables, transforms
 
 Cli = Callable[..., "subprocess.CompletedProcess[str]"]
 

@@ -11,6 +11,8 @@ import pytest
 from harness.description.locate import default_models_dir, find_model, locate_urdf, model_folders
 from harness.description.model import RobotModel, load_model
 from harness.errors import CrosscheckError, DescriptionUnavailable, InputError, ModelFileError
+from harness.options import Options
+from harness.sources import deviation_on_file, plan
 from tests.conftest import Edit
 
 NINE = ["humanoid_arm", "iiwa14", "panda", "sixr", "stanford", "ur10", "ur3", "ur5", "ur5e"]
@@ -152,7 +154,57 @@ def test_one_clear_error_in_an_accepted_deviation(copy_model: Callable[..., Path
     with (folder / "model.toml").open("a") as file:
         file.write(f"[[accepted]]\n{accepted}\n")
     with pytest.raises(InputError, match=message):
+        plan(load_model(folder), Options())
+
+
+def test_an_accepted_deviation_may_be_for_all_urdf_sources_or_one_not_listed(models: dict[str, RobotModel]) -> None:
+    on_file = deviation_on_file(models["iiwa14"], "urdf:mujoco", "dh:numpy", "tool0")
+    assert on_file is not None
+    assert on_file[0].position == 0.00087248
+    assert deviation_on_file(models["iiwa14"], "dh:pinocchio", "dh:numpy", "tool0") is None
+    assert deviation_on_file(models["ur5"], "dh:roboticstoolbox-packaged", "dh:numpy", "tool0") is not None
+
+
+@pytest.mark.parametrize(
+    ("engine", "message"),
+    [
+        ('base = "base_lnk"', r"engine.\"urdf:x\".base: no mapped frame 'base_lnk'; did you mean 'base_link'"),
+        (
+            'base = "tool0"',
+            "expected a frame at a declared offset from DH frame base or 0, 'tool0' is not; choose among: base, base_link",
+        ),
+        ('base = "base_link"\nwithout = ["base_link"]', "'base_link' is the base and left out at once"),
+        ('without = ["tol0"]', "no mapped frame 'tol0'; did you mean 'tool0'"),
+        ('without = ["tool0", "wrist_3_link", "ee_link"]', "without: no mapped frame moves with joint 'wrist_3_joint'"),
+        ('frames = { tool = "flange" }', "no mapped frame 'tool'; did you mean 'tool0'"),
+        ('joints = { elbow = "j3" }', "no joint 'elbow'; did you mean 'elbow_joint'"),
+        ('robot = ""', "robot"),
+        ('bass = "base"', "did you mean 'base'"),
+    ],
+)
+def test_one_clear_error_in_the_names_of_an_engine(copy_model: Callable[..., Path], engine: str, message: str) -> None:
+    folder = copy_model("ur5")
+    with (folder / "frames.toml").open("a") as file:
+        file.write(f'[engine."urdf:x"]\n{engine}\n')
+    with pytest.raises(InputError, match=message):
         load_model(folder)
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ('name = "controller"', "expected the name of an engine such as dh:pinocchio, or a command, got 'controller' alone"),
+        ('name = "controller"\ncommand = []', "command"),
+        ('name = "dh:numpy"\ncommand = ["x"]', "dh:numpy: this is the name of an engine; give the command another"),
+        ('name = "dh:nowhere"', "no source 'dh:nowhere'"),
+    ],
+)
+def test_one_clear_error_in_a_source(copy_model: Callable[..., Path], entry: str, message: str) -> None:
+    folder = copy_model("ur5")
+    with (folder / "model.toml").open("a") as file:
+        file.write(f"[[source]]\n{entry}\n")
+    with pytest.raises(InputError, match=message):
+        plan(load_model(folder), Options())
 
 
 @pytest.mark.parametrize("kind", ["floating", "planar"])

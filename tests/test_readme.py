@@ -50,11 +50,13 @@ def test_the_example_prints_what_it_shows(tmp_path: Path) -> None:
     assert [line.rstrip() for line in result.stdout.splitlines()] == shown
 
 
-@pytest.mark.parametrize("command", ["run", "frames", "engines", "render", "completion", "derive-dh", "export-urdf"])
+@pytest.mark.parametrize(
+    "command", ["run", "frames", "engines", "worker-check", "render", "completion", "derive-dh", "export-urdf"]
+)
 def test_every_command_is_shown(command: str) -> None:
     assert command in cli.commands
     assert f"crosscheck {command}" in README
-    assert len(cli.commands) == 7
+    assert len(cli.commands) == 8
 
 
 def test_every_source_and_robot_is_listed() -> None:

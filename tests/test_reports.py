@@ -13,7 +13,6 @@ import pytest
 from junitparser import JUnitXml
 from lxml import html as lxml_html
 
-from harness.crosscheck import crosscheck
 from harness.description.model import RobotModel, load_model
 from harness.errors import InputError
 from harness.options import Options
@@ -24,6 +23,7 @@ from harness.report.json_file import read_report, schema, to_json
 from harness.report.junit import render_junit
 from harness.report.markdown import render_markdown
 from harness.report.text import metres, numbers, plain, radians
+from tests.helpers import crosscheck
 
 FAST = ("dh:pinocchio", "urdf:pinocchio")
 

@@ -41,13 +41,17 @@ class Engine(ABC):
     A subclass's module runs in environments that have little more than NumPy and the library: it imports nothing else of
     third parties, and the library itself only in the constructor, through `library()`.
 
-    isolated: whether it runs in a process of its own. requirements: what pip installs. debian: packages of the system's own
-    Python instead, `imports` the modules they bring.
+    partial: it drops links by design, which its traits tell; what it has must still show every joint. isolated: whether it
+    runs in a process of its own. requirements: what pip installs. debian: packages of the system's own Python instead,
+    `imports` the modules they bring. resolution: what its arithmetic is good for [m, rad], if that is worse than float64: the
+    tolerance where model.toml does not give it one.
     """
 
     source: str
     takes: ClassVar[Literal["", "table", "urdf", "packaged"]] = ""
+    partial: bool = False
     isolated: ClassVar[bool] = True
+    resolution: ClassVar[float] = 0.0
     requirements: ClassVar[tuple[str, ...]] = ()
     debian: ClassVar[tuple[str, ...]] = ()
     imports: ClassVar[tuple[str, ...]] = ()

@@ -45,7 +45,7 @@ class Child:
             self.process = subprocess.Popen(command, bufsize=0, stdin=pipe, stdout=pipe, stderr=pipe, cwd=cwd, env=env, **joining)
         except (OSError, ValueError, subprocess.SubprocessError) as error:
             raise ChildError(f"cannot start {command[0]!r}: {error}") from error
-        self.over = ""
+        self.command, self.over = tuple(command), ""
         self._tail = b""
         self._surplus = b""  # what came behind a line
         self._selector = selectors.DefaultSelector()

@@ -59,6 +59,10 @@ class DHKdl(Engine):
         self.joints = description.joints
         self.frames = tuple(self._segments)
 
+    def installed(self) -> dict[str, str]:
+        """Version of PyKDL, which is no distribution of pip's."""
+        return {"PyKDL": str(self._kdl.__version__)}
+
     def _placements(self, q: Array, frames: Sequence[str]) -> Array:
         solve, frame = self._solver.JntToCart, self._kdl.Frame()
         joints = self._kdl.JntArray(len(self.joints))

@@ -70,6 +70,10 @@ class DHNumpy(Engine):
         self.joints = description.joints
         self.frames = description.frames
 
+    def installed(self) -> dict[str, str]:
+        """Version of NumPy, which the harness itself needs."""
+        return {"numpy": np.__version__, **self.versions()}
+
     def _placements(self, q: Array, frames: Sequence[str]) -> Array:
         count = q.shape[0]
         # (F, 4, 4, N): each entry of a placement is one contiguous vector over the configurations.

@@ -15,6 +15,7 @@ class DHRoboticstoolboxPackaged(DHRoboticstoolbox):
 
     source = "dh:roboticstoolbox-packaged"
     takes = "packaged"
+    partial = True
     traits = (
         Trait(
             "packaged-numbers",

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import BaseModel, ValidationError, field_validator
 
 from harness.engines import protocol
-from harness.engines.base import Engine, Trait
+from harness.engines.base import Engine
 from harness.engines.child import Child, ChildError
 from harness.errors import EngineFailed, EngineUnavailable
 from harness.se3 import Array
@@ -37,6 +37,7 @@ class Answer(BaseModel):
     frames: list[str]
     name: str = ""
     versions: dict[str, str] = {}
+    again: bool = False
 
     @field_validator("protocol")
     @classmethod
@@ -72,34 +73,40 @@ class Refusal(BaseModel):
 class ProcessEngine(Engine):
     """A worker that has answered the greeting. `seconds` is its own computing time, `waited` the harness's for its blocks."""
 
-    def __init__(self, source: str, child: Child, greeting: bytes, limits: Limits, traits: Sequence[Trait] = ()) -> None:
-        """Greet it. Raises EngineUnavailable (its library is not there) or EngineFailed."""
-        self.source, self.traits = source, tuple(traits)
-        self._child, self._limits = child, limits
+    def __init__(self, source: str, child: Child, greeting: bytes, limits: Limits, adapter: type[Engine] | None = None) -> None:
+        """Greet it. Raises EngineUnavailable (its library is not there) or EngineFailed.
+
+        `adapter` is what it runs, if it is one of ours; a command of the user's may have the frames it likes.
+        """
+        self.source = source
+        self.traits = adapter.traits if adapter else ()
+        self.partial = adapter.partial if adapter else True
+        self.child, self._limits = child, limits
         self._lock = threading.Lock()
         self.seconds = self.waited = 0.0
         start = time.perf_counter()
         answer = self._greet(greeting)
         self.started_in = time.perf_counter() - start
         self.joints, self.frames, self._versions = tuple(answer.joints), tuple(answer.frames), answer.versions
+        self.idle = answer.again  # whether its child may be greeted again
 
     def _greet(self, greeting: bytes) -> Answer:
         try:
-            text = self._child.line(greeting, self._limits.start)
+            text = self.child.line(greeting, self._limits.start)
         except ChildError as error:
-            self._child.kill()
+            self.child.kill()
             raise EngineFailed(self.source, f"at the start: {error}") from error
         try:
             return read_answer(text)
         except EngineUnavailable as error:
             raise EngineUnavailable(self.source, error.reason) from None
         except ValueError as error:
-            self._child.kill()
-            raise EngineFailed(self.source, f"{error}{self._child.last_words()}") from error
+            self.child.kill()
+            raise EngineFailed(self.source, f"{error}{self.child.last_words()}") from error
 
     def finish(self, timeout: float) -> int | None:
         """Let it end by itself. Returns its exit code, None if it goes on for longer than `timeout` [s]."""
-        return self._child.finish(timeout)
+        return self.child.finish(timeout)
 
     def installed(self) -> dict[str, str]:
         """Versions of its libraries, as it says."""
@@ -119,14 +126,14 @@ class ProcessEngine(Engine):
         with self._lock:
             start = time.perf_counter()
             try:
-                self._child.expect_silence()
-                self._child.into(out.data.cast("B"), back[:1].data.cast("B"), self._limits.block)
+                self.child.expect_silence()
+                self.child.into(out.data.cast("B"), back[:1].data.cast("B"), self._limits.block)
                 self._check_count(back[0], len(q))
-                left = self._limits.block - (time.perf_counter() - start)
-                self._child.into(memoryview(b""), back[1:].data.cast("B"), left)
-                self._child.expect_silence()
+                self.child.into(memoryview(b""), back[1:].data.cast("B"), self._limits.block)
+                self.child.expect_silence()
             except ChildError as error:
-                self._child.kill()
+                self.idle = False
+                self.child.kill()
                 raise EngineFailed(self.source, f"in a block of {len(q)}: {error}") from error
             finally:
                 self.waited += time.perf_counter() - start
@@ -136,7 +143,7 @@ class ProcessEngine(Engine):
     def _check_count(self, count: float, expected: int) -> None:
         """Raise EngineFailed with the worker's own reason, or ChildError if the count is not the one asked for."""
         if count == protocol.FAILED:
-            text = self._child.line(b"", self._limits.block)
+            text = self.child.line(b"", self._limits.block)
             try:
                 raise EngineFailed(self.source, Refusal.model_validate_json(text).error)
             except ValidationError:

@@ -1,7 +1,8 @@
 """The worker protocol, version 1: what goes over the pipes (docs/worker-protocol.md). Shared by both ends.
 
 Greeting (one line of JSON) -> answer (one line of JSON) -> blocks of little-endian float64: N, then q (N, n) to the worker;
-N, seconds, then placements (N, F, 4, 4) from it. N = -1 and one line of JSON instead: this block failed.
+N, seconds, then placements (N, F, 4, 4) from it. N = -1 and one line of JSON instead: this block failed. N = 0 to a worker
+that offers it: another greeting follows.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ VERSION = 1
 MAX_BLOCK = 4096
 FAILED = -1.0
 FLOAT = np.dtype("<f8")
+AGAIN = np.zeros(1, FLOAT).tobytes()
 
 Description: TypeAlias = "DHTable | UrdfText | Packaged"
 

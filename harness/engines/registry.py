@@ -70,7 +70,7 @@ def description_of(source: str, model: RobotModel, takes: str = "") -> Descripti
         names = model.engine_names.get(source)
         if names is None or names.robot is None:
             hint = f'in frames.toml, [engine."{source}"] robot = "..."'
-            raise EngineUnavailable(source, f"no packaged robot is named for {model.name}: {hint}")
+            raise EngineUnavailable(source, f"no packaged robot is named: {hint}")
         return Packaged(names.robot, model.table.joints)
     if kind_of(source) == "dh":
         return model.table

@@ -26,6 +26,7 @@ class UrdfFrax(Engine):
     """
 
     source = "urdf:frax"
+    partial = True
     requirements = ("frax>=0.1", "jax>=0.4.30")
     traits = (
         Trait(

@@ -22,6 +22,7 @@ class UrdfIkpy(Engine):
     """
 
     source = "urdf:ikpy"
+    partial = True
     requirements = ("ikpy>=4.2",)
     traits = (
         Trait(
@@ -71,6 +72,10 @@ class UrdfIkpy(Engine):
         self._columns = [i for i, link in enumerate(self._chain.links) if link.joint_type != "fixed"]
         self.joints = tuple(self._chain.links[i].name for i in self._columns)
         self.frames = (root, *(child_of[link.name] for link in self._chain.links[1:]))
+        if not self.joints:
+            raise EngineFailed(
+                self.source, f"follows the first child of each link, {' -> '.join(self.frames)}: no joint moves it"
+            )
 
     def _placements(self, q: Array, frames: Sequence[str]) -> Array:
         slots = [self.frames.index(frame) for frame in frames]

@@ -78,6 +78,10 @@ class UrdfKdl(Engine):
             columns = [self.joints.index(j) for segment in path if (j := segment.getJoint().getName()) in self.joints]
             self._chains.append((kdl.ChainFkSolverPos_recursive(chain), columns, kdl.JntArray(len(columns)), chain))
 
+    def installed(self) -> dict[str, str]:
+        """Version of PyKDL, which is no distribution of pip's."""
+        return {"PyKDL": str(self._kdl.__version__)}
+
     def _placements(self, q: Array, frames: Sequence[str]) -> Array:
         frame = self._kdl.Frame()
         used = [self._chains[i] for i in {self._ways[name][0] for name in frames}]

@@ -19,6 +19,7 @@ class UrdfPytorchKinematics(Engine):
     """`build_chain_from_urdf(...).to(dtype=float64)`: all links of the tree, one batched call per block."""
 
     source = "urdf:pytorch-kinematics"
+    resolution = 1e-6  # float32 origins, summed over a long arm
     requirements = ("pytorch-kinematics>=0.7", "torch>=2.4")
     traits = (
         Trait(

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def main() -> int:
-    """Serve one description until stdin ends. Returns the exit code."""
+    """Serve one description after the other until stdin ends. Returns the exit code."""
     # Libraries print what they like: only the protocol may reach the pipe that was stdout.
     pipe = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
@@ -52,42 +52,41 @@ def _serve(adapter: str, source: BinaryIO, sink: BinaryIO) -> int:
         sink.flush()
 
     module, _, name = adapter.partition(":")
-    first = source.readline()
-    if not first:
-        return 0
-    greeting = json.loads(first)
-    try:
-        engine: Engine = getattr(importlib.import_module(module), name)(protocol.decode(greeting["description"]))
-    except EngineUnavailable as error:
-        say({"error": error.reason, "unavailable": True})
-        return 1
-    except Exception as error:  # whatever a library raises is the answer
-        say({"error": error.reason if isinstance(error, EngineFailed) else f"{type(error).__name__}: {error}"})
-        return 1
-    frames = tuple(frame for frame in greeting["frames"] if frame in engine.frames)
-    say(
-        {
-            "protocol": protocol.PROTOCOL,
-            "version": protocol.VERSION,
-            "name": engine.source,
-            "joints": list(engine.joints),
-            "frames": list(frames),
-            "versions": engine.versions(),
-        }
-    )
-    _blocks(engine, frames, source, sink)
+    while first := source.readline():
+        greeting = json.loads(first)
+        try:
+            engine: Engine = getattr(importlib.import_module(module), name)(protocol.decode(greeting["description"]))
+        except EngineUnavailable as error:
+            say({"error": error.reason, "unavailable": True})
+            return 1
+        except Exception as error:  # whatever a library raises is the answer
+            say({"error": error.reason if isinstance(error, EngineFailed) else f"{type(error).__name__}: {error}"})
+            return 1
+        frames = tuple(frame for frame in greeting["frames"] if frame in engine.frames)
+        say(
+            {
+                "protocol": protocol.PROTOCOL,
+                "version": protocol.VERSION,
+                "name": engine.source,
+                "joints": list(engine.joints),
+                "frames": list(frames),
+                "versions": engine.installed(),
+                "again": True,
+            }
+        )
+        _blocks(engine, frames, source, sink)
     return 0
 
 
 def _blocks(engine: Engine, frames: tuple[str, ...], source: BinaryIO, sink: BinaryIO) -> None:
+    """Answer blocks until stdin ends or another description is announced, by a block of 0."""
     import numpy as np  # noqa: PLC0415
 
     from harness.engines import protocol  # noqa: PLC0415
     from harness.errors import EngineFailed  # noqa: PLC0415
 
     width = len(engine.joints)
-    while head := source.read(8):
-        count = int(np.frombuffer(head, protocol.FLOAT)[0])
+    while (head := source.read(8)) and (count := int(np.frombuffer(head, protocol.FLOAT)[0])):
         q = np.frombuffer(source.read(8 * count * width), protocol.FLOAT).reshape(count, width)
         start = time.perf_counter()
         try:

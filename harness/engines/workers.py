@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import os
 import subprocess
@@ -14,7 +15,7 @@ from types import TracebackType
 from typing import Any, TypeVar
 
 from harness.engines import protocol, requirements
-from harness.engines.base import Engine, Trait
+from harness.engines.base import Engine
 from harness.engines.child import Child, ChildError
 from harness.engines.environments import where
 from harness.engines.memory import MemoryWatch
@@ -40,6 +41,7 @@ class Workers:
         self.jobs = 1 if in_process else jobs or os.cpu_count() or 1
         self._pool = ThreadPoolExecutor(self.jobs)
         self._children: list[Child] = []
+        self._idle: dict[tuple[str, ...], list[Child]] = {}
         self._lock = threading.Lock()
         self._warden: subprocess.Popen[bytes] | None = None
         self._closing = threading.Event()
@@ -78,10 +80,22 @@ class Workers:
         script = str(Path(__file__).with_name("worker.py"))
         command = [python, script, f"{adapter.__module__}:{adapter.__qualname__}", *packages]
         greeting = protocol.greeting(description, tuple(frames))
-        return self.start(adapter.source, command, greeting, traits=adapter.traits)
+        with self._lock:
+            idle = self._idle.get(tuple(command), [])
+            child = idle.pop() if idle else None
+        if child is not None:
+            with contextlib.suppress(EngineFailed):  # what it served before may have spoilt it: a new one then
+                return ProcessEngine(adapter.source, child, protocol.AGAIN + greeting, self.limits, adapter)
+        return self.start(adapter.source, command, greeting, adapter=adapter)
+
+    def release(self, engine: Engine) -> None:
+        """Take back an engine that is needed no more; its worker may serve another description."""
+        if isinstance(engine, ProcessEngine) and engine.idle:
+            with self._lock:
+                self._idle.setdefault(tuple(engine.child.command), []).append(engine.child)
 
     def start(
-        self, source: str, command: Sequence[str], greeting: bytes, cwd: Path | None = None, traits: Sequence[Trait] = ()
+        self, source: str, command: Sequence[str], greeting: bytes, cwd: Path | None = None, adapter: type[Engine] | None = None
     ) -> ProcessEngine:
         """Start a worker command and greet it. Raises EngineFailed or EngineUnavailable."""
         env = {**dict.fromkeys(ONE_THREAD, "1"), **os.environ}
@@ -93,7 +107,7 @@ class Workers:
                 self._children.append(child)
         except ChildError as error:
             raise EngineFailed(source, str(error)) from error
-        return ProcessEngine(source, child, greeting, self.limits, traits)
+        return ProcessEngine(source, child, greeting, self.limits, adapter)
 
     def _group(self) -> int:
         """Process group of the workers: that of the warden, which is started with the first of them."""
