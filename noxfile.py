@@ -107,5 +107,6 @@ def bench(session: nox.Session) -> None:
     """Speed and memory as ratios within one run, 10 000 random certificates, derive-dh on every packaged chain."""
     session.install(CONSTRAINTS, f"pin=={NEWEST_PIN}", ".[all,test]")
     session.run("python", "bench/bench.py")
+    session.run("python", "bench/engines.py")
     session.run("python", "bench/soundness.py", *(session.posargs or ["10000"]))
     session.run("python", "bench/derive_all.py")
