@@ -98,7 +98,7 @@ def lint(session: nox.Session) -> None:
 @nox.session
 def types(session: nox.Session) -> None:
     """Types: mypy, strict."""
-    session.install(CONSTRAINTS, "mypy", "nox", ".[test]")
+    session.install(CONSTRAINTS, "mypy", "nox", "types-psutil", ".[test]")
     session.run("mypy")
 
 

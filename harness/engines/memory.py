@@ -1,4 +1,4 @@
-"""How much memory a worker and what it has started use."""
+"""How much memory workers, and what they have started, use."""
 
 from __future__ import annotations
 
@@ -11,18 +11,27 @@ LOOK_BELOW = 1.0  # seconds: finding descendants means reading the whole process
 
 
 class MemoryWatch:
-    """Resident bytes by process id; descendants are looked up once a second."""
+    """Resident bytes by process id. The process table is read once a second, for all workers together."""
 
     def __init__(self) -> None:
-        self._below: dict[int, tuple[float, int]] = {}
+        self._children: dict[int, list[int]] = {}
+        self._read = float("-inf")
 
     def used(self, pid: int) -> int:
         """Bytes used by the process and its descendants, 0 if it has ended."""
-        with contextlib.suppress(psutil.Error):
-            process = psutil.Process(pid)
-            when, below = self._below.get(pid, (0.0, 0))
-            if time.monotonic() - when > LOOK_BELOW:
-                below = sum(child.memory_info().rss for child in process.children(recursive=True))
-                self._below[pid] = (time.monotonic(), below)
-            return int(process.memory_info().rss) + below
-        return 0
+        self._look_below()
+        total, todo = 0, [pid]
+        while todo:
+            current = todo.pop()
+            todo += self._children.get(current, [])
+            with contextlib.suppress(psutil.Error):
+                total += psutil.Process(current).memory_info().rss
+        return total
+
+    def _look_below(self) -> None:
+        if time.monotonic() - self._read < LOOK_BELOW:
+            return
+        self._children = {}
+        for process in psutil.process_iter(["ppid"]):
+            self._children.setdefault(process.info["ppid"], []).append(process.pid)
+        self._read = time.monotonic()
