@@ -9,17 +9,24 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import psutil
 import pytest
 
 from harness.crosscheck import crosscheck
 from harness.description.model import RobotModel, load_model
+from harness.engines.dh_numpy import DHNumpy
+from harness.engines.dh_pinocchio import DHPinocchio
 from harness.engines.process import Limits
+from harness.engines.workers import Workers
+from harness.errors import InputError
 from harness.options import Options
 from harness.report.document import Report, Source
 from harness.report.files import write_report
 from harness.report.json_file import read_report
+from tests.helpers import assert_placements_close
 
 WORKER = str(Path(__file__).parent / "faulty_worker.py")
 LIMITS = Limits(start=5.0, block=5.0, memory=400 << 20)
@@ -117,6 +124,72 @@ def test_a_command_that_is_not_there(models: dict[str, RobotModel]) -> None:
     report = with_fault(models["ur3"], "", workers=(("controller", ("no-such-program",)),))
     assert "cannot start 'no-such-program'" in named(report, "controller").reason
     assert report.verdict.exit_code == 3
+
+
+def test_in_process_starts_nothing(models: dict[str, RobotModel]) -> None:
+    before = len(below())
+    report = crosscheck(
+        models["ur3"], Options(10, sources=("dh:pinocchio",), in_process=True), lambda done, total: in_run(before)
+    )
+    assert report.verdict.exit_code == 0
+
+
+def in_run(expected: int) -> None:
+    assert len(below()) == expected
+
+
+def test_a_worker_serves_one_robot_after_the_other(models: dict[str, RobotModel]) -> None:
+    """The same process; and after it has died, another."""
+    with Workers() as workers:
+        served = []
+        for robot in ("ur3", "panda", "stanford"):
+            description = models[robot].table
+            engine = workers.load(DHPinocchio, description, description.frames)
+            q = np.full((3, len(description.joints)), 0.3)
+            assert_placements_close(engine.placements(q, engine.frames), DHNumpy(description).placements(q, engine.frames), 1e-13)
+            workers.release(engine)
+            (worker,) = (p for p in below() if "worker.py" in " ".join(p.cmdline()))
+            served.append(worker.pid)
+            if robot == "panda":
+                worker.kill()
+                worker.wait(10.0)
+        assert served[0] == served[1] != served[2]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"jobs": -1}, "expected jobs >= 0"),
+        ({"limits": Limits(start=0.0)}, "expected a start timeout > 0 s"),
+        ({"limits": Limits(block=float("nan"))}, "expected a block timeout > 0 s"),
+        ({"limits": Limits(memory=0)}, "expected a memory limit > 0"),
+    ],
+)
+def test_impossible_options(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Options(**options)
+
+
+@pytest.mark.parametrize(
+    ("fault", "code", "text"),
+    [
+        ("none", 0, "ok    ends with exit code 0 when its stdin ends"),
+        ("prints rubbish", 1, "does it print to stdout?"),
+        ("big-endian", 1, "write little-endian"),
+        ("column-major", 1, "the last column is 0 0 0 1 instead: write rows first, or transpose each matrix"),
+        ("nan", 1, "WRONG placements are finite"),
+        ("not a rotation", 1, "WRONG rotations are rotations"),
+        ("the previous block", 1, "it keeps state between configurations or blocks"),
+        ("too many frames", 1, "more than it was asked for"),
+        ("segfaults", 1, "killed by SIGSEGV"),
+        ("does not end", 1, "it went on running for 5 s"),
+    ],
+)
+def test_worker_check(cli: Callable[..., subprocess.CompletedProcess[str]], fault: str, code: int, text: str) -> None:
+    result = cli("worker-check", "--start-timeout", "20", "--block-timeout", "5", "--", sys.executable, WORKER, fault)
+    assert result.returncode == code, result.stdout + result.stderr
+    assert text in result.stdout
+    assert result.stderr == ""
 
 
 def descendants(pid: int) -> list[psutil.Process]:
