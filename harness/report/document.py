@@ -276,7 +276,7 @@ class Report(Part):
     """The whole document."""
 
     format: Literal["fk-crosscheck report"] = "fk-crosscheck report"
-    version: Literal["1.0", "1.1"] = "1.1"
+    version: Literal["1.1"] = "1.1"
     robot: Robot
     settings: Settings
     verdict: Verdict
