@@ -16,11 +16,12 @@ import numpy as np
 import pytest
 
 from harness import se3
+from harness.derive import derive
 from harness.description.dh import DHRow, DHTable
-from harness.description.model import RobotModel
+from harness.description.model import RobotModel, load_model
 from harness.description.packaged import Packaged
 from harness.description.urdf import Urdf
-from harness.description.urdf_file import parse_urdf
+from harness.description.urdf_file import parse_urdf, read_urdf
 from harness.description.urdf_lint import lint
 from harness.engines import requirements
 from harness.engines.base import Engine, Trait
@@ -29,9 +30,11 @@ from harness.engines.protocol import Description
 from harness.engines.registry import REFERENCE, adapter_of, description_of, registered
 from harness.engines.workers import Workers
 from harness.errors import EngineFailed, EngineUnavailable, InputError
+from harness.options import Options
 from harness.se3 import Array
-from tests.conftest import engines
-from tests.helpers import assert_placements_close
+from harness.write_model import write_model
+from tests.conftest import WITHOUT, engines
+from tests.helpers import assert_placements_close, crosscheck
 
 Build: TypeAlias = Callable[..., Engine]
 
@@ -294,6 +297,24 @@ def test_packaged_robots(build: Build) -> None:
         build(source, Packaged("UR6", tuple("abcdef")))
     with pytest.raises(EngineFailed, match="expected 5 joints"):
         build(source, Packaged("UR5", tuple("abcde")))
+
+
+@pytest.mark.skipif(not ALL, reason="needs every engine: CROSSCHECK_TESTS_ENGINES=all")
+def test_an_oblique_axis_is_wrong_in_one_library_alone(tmp_path: Path) -> None:
+    """Its trait says so, and the report names it; every other engine there is agrees with the derived table."""
+    text = "".join(joint(f"j{i}", i, axis=axis) for i, axis in enumerate(("0 0 1", "0 0.6 0.8", "1 0 0"), start=1))
+    path = tmp_path / "oblique.urdf"
+    path.write_text(f"<robot name='oblique'><link name='root'/><link name='l1'/><link name='l2'/><link name='l3'/>{text}</robot>")
+    derived = derive(read_urdf(path), "root", "l3", "standard", "urdf:pinocchio")
+    model = load_model(write_model(derived, "oblique", "urdf:pinocchio", tmp_path))
+    report = crosscheck(model, Options(200, all_engines=True))
+    verdicts = {s.name: s.verdict for s in report.sources if s.name not in WITHOUT}
+    assert verdicts.pop("dh:roboticstoolbox-packaged") == "not run"
+    assert {name for name, verdict in verdicts.items() if verdict not in ("agrees", "reference")} == {"urdf:roboticstoolbox"}
+    (wrong,) = (s for s in report.sources if s.name == "urdf:roboticstoolbox")
+    assert wrong.verdict == "disagrees"
+    assert any("taken for z" in text for text in wrong.explained_by)
+    assert report.verdict.exit_code == 1
 
 
 @pytest.mark.parametrize("source", engines(REFERENCE, *DH_ENGINES, *URDF_ENGINES))
