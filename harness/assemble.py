@@ -84,7 +84,7 @@ def _frames(results: Results) -> list[doc.Frame]:
                 relation=frame.relation,
                 of=frame.of,
                 offset=None if offset is None else offset.tolist(),
-                measured_from=results.measured_from if frame.relation == "rigid" else "",
+                measured_from=results.measured_from.get(frame.name, ""),
             )
         )
     return frames

@@ -27,8 +27,9 @@ class Bound:
     """An engine bound to a model: asked in the model's joint order, answering at the mapped frames.
 
     `frames` are the engine's frame names that are read; `view` tells how mapped frames follow from them; `missing` are
-    indices of mapped frames the engine does not have, though its description does; `absent` those it need not have; `read_in`
-    the frame its placements are read in, if not the base frame; `waited` is the time spent on its answers.
+    indices of mapped frames the engine does not have, though its description does (`missing_names`); `absent` those it need
+    not have, and `undeclared` those of them that frames.toml does not say so of; `read_in` the frame its placements are read
+    in, if not the base frame; `waited` is the time spent on its answers.
     """
 
     engine: Engine
@@ -37,6 +38,8 @@ class Bound:
     view: View
     missing: tuple[int, ...] = ()
     absent: tuple[str, ...] = ()
+    undeclared: tuple[str, ...] = ()
+    missing_names: tuple[str, ...] = ()
     read_in: str = ""
     waited: float = 0.0
 
@@ -81,30 +84,59 @@ def bind(engine: Engine, model: RobotModel, offsets: Mapping[str, Array]) -> Bou
     joint_map = model.joint_map(kind).renamed(names.joints)
     _check_joints(engine, joint_map)
     frames = model.frames.frames
-    labels = [None if f.name in names.without else _label(f, kind, names) for f in frames]
+    labels = [None if f.name in names.without else _label_there(f, kind, names, engine, model) for f in frames]
+    if isinstance(engine, ProcessEngine) and engine.is_program:
+        _check_frame_names(engine, kind, names, model)
     read = [x for x in dict.fromkeys(labels) if x is not None and x in engine.frames]
     slots = tuple(read.index(x) if x in read else -1 for x in labels)
     missing = tuple(i for i, x in enumerate(labels) if x is not None and x not in read)
     absent = [f.name for f in frames if f.name in names.without]
+    undeclared = [frames[i].name for i in missing] if engine.partial else []
     if engine.partial:
         if joint := unchecked_joint((f for f, slot in zip(frames, slots, strict=True) if slot >= 0), model.table):
-            raise EngineFailed(engine.source, f"has no frame that joint {joint!r} moves, among {', '.join(engine.frames)}")
-        absent += [frames[i].name for i in missing]
+            asked = ", ".join(dict.fromkeys(x for x in labels if x is not None))
+            has = ", ".join(engine.frames)
+            raise EngineFailed(
+                engine.source, f"has none of the frames that joint {joint!r} moves: asked for {asked}; it has {has}"
+            )
+        absent += undeclared
         missing = ()
     constant = np.array([_constant(f, kind, names, offsets) for f in frames])
     anchor = _anchor(engine, model, kind, names)
     view = View(slots, constant, None)
     if anchor is not None:
         T = placement_in_base(anchor, model.frames.base, model.table)
-        base = read.index(str(_label(anchor, kind, names)))
+        base = read.index(str(_label_there(anchor, kind, names, engine, model)))
         view = View(slots, constant, base, None if np.array_equal(T, np.eye(4)) else T)
     read_in = "" if anchor in (None, model.frames.base) else anchor.name if anchor else ""
-    return Bound(engine, joint_map, tuple(read), view, missing, tuple(absent), read_in)
+    lost = tuple(frames[i].name for i in missing)
+    return Bound(engine, joint_map, tuple(read), view, missing, tuple(absent), tuple(undeclared), lost, read_in)
 
 
 def _label(frame: MappedFrame, kind: str, names: EngineNames) -> str | None:
     """What an engine calls a mapped frame; None if its description does not have it."""
     return names.frames.get(frame.name) or (frame.dh if kind == "dh" else frame.urdf)
+
+
+def _label_there(frame: MappedFrame, kind: str, names: EngineNames, engine: Engine, model: RobotModel) -> str | None:
+    """The label under which this engine has the frame: `base` and `0`, or `tool` and the last row, may be one frame."""
+    label = _label(frame, kind, names)
+    if kind == "urdf" or label in engine.frames or frame.name in names.frames:
+        return label
+    table = model.table
+    pairs = (("base", "0", table.base), ("tool", str(len(table.rows)), table.tool))
+    for one, other, T in pairs:
+        if label in (one, other) and np.array_equal(T, np.eye(4)):
+            return next((x for x in (one, other) if x in engine.frames), label)
+    return label
+
+
+def _check_frame_names(engine: Engine, kind: str, names: EngineNames, model: RobotModel) -> None:
+    """A frame under a name that nothing has is a misspelling: it would go unread."""
+    known = {*names.frames.values(), *(model.table.frames if kind == "dh" or model.urdf is None else model.urdf.links)}
+    if unknown := [frame for frame in engine.frames if frame not in known]:
+        hint = f'another name can be given in frames.toml, [engine."{engine.source}"] frames'
+        raise EngineFailed(engine.source, f"has a frame {unknown[0]!r}: {nearest(unknown[0], known)}; {hint}")
 
 
 def _check_joints(engine: Engine, joint_map: JointMap) -> None:
@@ -130,7 +162,7 @@ def _anchor(engine: Engine, model: RobotModel, kind: str, names: EngineNames) ->
         fit = [model.frames.base, *(f for f in frames if f.dh in ("base", "0") and f.offset is not None)]
         fit = [f for f in fit if f.name not in names.without]
     for frame in fit:
-        if _label(frame, kind, names) in engine.frames:
+        if _label_there(frame, kind, names, engine, model) in engine.frames:
             return frame
     raise EngineFailed(engine.source, f"has none of the frames that stand still: {', '.join(f.name for f in fit)}")
 

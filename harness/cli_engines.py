@@ -12,6 +12,7 @@ from rich.text import Text
 from harness.binding import bind, wanted_frames
 from harness.cli_run import complete_sources, models_option
 from harness.console import console
+from harness.description.frames_file import EngineNames
 from harness.description.locate import default_models_dir, find_model
 from harness.description.model import RobotModel, load_model
 from harness.engines import protocol
@@ -82,17 +83,27 @@ def worker_check(
             engine = workers.start(name, words, greeting)
         except (EngineFailed, EngineUnavailable) as error:
             return _tell([Finding(first, error.reason)])
-        return _tell(chain([Finding(first), _names(engine, model)], examine(engine)))
+        turning = [_turns(joint, engine, model) for joint in engine.joints]
+        return _tell(chain([Finding(first), _names(engine, model)], examine(engine, turning)))
+
+
+def _turns(joint: str, engine: ProcessEngine, model: RobotModel) -> bool:
+    """Whether a joint of the worker is revolute in the robot model, as far as the model knows it."""
+    names = model.engine_names.get(engine.source, EngineNames()).joints
+    own = next((ours for ours, theirs in names.items() if theirs == joint), joint)
+    if own in model.table.joints:
+        return model.table.kind(own) == "revolute"
+    return model.urdf is not None and own in model.urdf.joints and model.urdf.joints[own].type != "prismatic"
 
 
 def _names(engine: ProcessEngine, model: RobotModel) -> Finding:
     """Whether it uses the names of the robot model."""
     what = f"knows the joints and frames of {model.name}"
     try:
-        bind(engine, model, {})
+        bound = bind(engine, model, {})
     except EngineFailed as error:
-        return Finding(what, f'{error.reason}; other names can be given in frames.toml, [engine."{engine.source}"]')
-    return Finding(what)
+        return Finding(what, error.reason)
+    return Finding(f"{what}, all but {', '.join(bound.undeclared)}" if bound.undeclared else what)
 
 
 def _tell(findings: Iterable[Finding]) -> int:

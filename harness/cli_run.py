@@ -126,7 +126,7 @@ def run(
     Exit code: 0 all agree, 1 a disagreement, 2 wrong input, 3 a required source is missing or failed; with several of
     these, the smallest.
     """
-    limits = Limits(start_timeout, block_timeout, int(memory_limit * 2**30))
+    limits = Limits(start_timeout, block_timeout, memory_limit * 2**30)
     options = Options(samples, seed, sources, reference, "", certify, all_engines, workers, limits, jobs, in_process)
     folders = _folders(robots, models or default_models_dir())
     prepare(out)

@@ -15,8 +15,10 @@ from harness.description.model import RobotModel
 from harness.engines import protocol
 from harness.engines.base import Engine
 from harness.engines.dh_numpy import DHNumpy
+from harness.engines.process import ProcessEngine
 from harness.engines.registry import adapter_of, description_of, kind_of
 from harness.engines.workers import Workers
+from harness.errors import EngineFailed
 from harness.options import Options
 from harness.report.document import Report
 from harness.results import Reproduced, Results
@@ -44,9 +46,8 @@ def crosscheck(model: RobotModel, options: Options, progress: Progress | None = 
             results.reproduced = _reproduce(results, results.comparison)
             if options.certify:
                 results.certified = certify_all(results, workers)
-        for participant in participants:
-            if participant.bound is not None:
-                workers.release(participant.bound.engine)
+        _died(results)
+        workers.settle(p.bound.engine for p in participants if p.bound is not None)
     results.seconds = time.perf_counter() - started
     return assemble(results)
 
@@ -62,26 +63,57 @@ def _load(planned: Planned, model: RobotModel, workers: Workers) -> Engine:
 
 
 def _bind_all(results: Results, workers: Workers) -> None:
-    """Load every engine, measure the rigid offsets with the first URDF source that answers, then bind for good."""
+    """Load every engine, measure each rigid offset with the first URDF source that has the frame, then bind for good."""
     model = results.model
     q = model.configurations.lattice()
     in_house = bind(DHNumpy(model.table), model, {})
-    needs_measuring = any(frame.relation == "rigid" for frame in model.frames.frames)
+    rigid = {frame.name for frame in model.frames.frames if frame.relation == "rigid"}
     engines = {}
     tasks = [(p, workers.submit(partial(_load, p.planned, model, workers))) for p in results.participants]
     for participant, task in tasks:
         try:
             engine = engines[participant.name] = task.result()
             participant.bound = bind(engine, model, {})
-            if needs_measuring and not results.offsets and kind_of(participant.name) == "urdf":
-                results.offsets = measure_rigid(model, in_house, participant.bound, q)
-                results.measured_from = participant.name
+            if rigid - set(results.offsets) and kind_of(participant.name) == "urdf":
+                for name, offset in measure_rigid(model, in_house, participant.bound, q).items():
+                    if results.offsets.setdefault(name, offset) is offset:
+                        results.measured_from[name] = participant.name
         except Exception as error:  # an engine's failure is its result
             participant.fail(error)
     for participant in results.participants:
         if participant.bound is not None:
             participant.bound = bind(engines[participant.name], model, results.offsets)
+            _check_frames(participant, participant is results.participants[0])
     results.in_house = bind(DHNumpy(model.table), model, results.offsets)
+
+
+def _check_frames(participant: Participant, is_reference: bool) -> None:
+    """Take out a source that leaves unchecked what it should show: a reference without a frame, a program that lost one.
+
+    A program of model.toml must have every mapped frame, or frames.toml must say which it lacks; one given with --worker may
+    have those it likes, and the verdict names the others.
+    """
+    bound = participant.running()
+    if is_reference and (lost := [*bound.absent, *bound.missing_names]):
+        participant.fail(EngineFailed(participant.name, f"cannot be the reference: it does not have {', '.join(lost)}"))
+    elif participant.planned.folder is not None and participant.planned.command and bound.undeclared:
+        key = f'frames.toml, [engine."{participant.name}"] without = {list(bound.undeclared)}'
+        text = f"does not have {', '.join(bound.undeclared)}, among {', '.join(bound.engine.frames)}; if that is meant: {key}"
+        participant.fail(EngineFailed(participant.name, text))
+
+
+def _died(results: Results) -> None:
+    """A worker that crashed or hung after the comparison, while being certified, has failed like any other."""
+    for participant in results.participants:
+        engine = participant.bound.engine if participant.bound else None
+        if isinstance(engine, ProcessEngine) and engine.died:
+            participant.fail(EngineFailed(participant.name, engine.died))
+            if participant is results.participants[0]:
+                results.comparison = None
+            elif results.comparison is not None:
+                results.comparison.drop(participant.name)
+            results.certified.pop(participant.name, None)
+            results.reproduced.pop(participant.name, None)
 
 
 def _reproduce(results: Results, comparison: Comparison) -> dict[str, Reproduced]:

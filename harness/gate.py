@@ -20,7 +20,6 @@ def verdict(robot: str, sources: list[doc.Source], published: list[doc.Published
     compared = [s for s in sources if s.frames]
     if not compared and not missing and not wrong:
         missing.append("no source was compared: " + "; ".join(f"{s.name} {s.status}" for s in sources))
-    aside = {status: [s.name for s in sources if s.status == status and not s.required] for status in ("not run", "failed")}
     if wrong:
         sentence = f"{robot} DISAGREES: {wrong[0]}"
         return doc.Verdict(exit_code=1, sentence=sentence, reasons=wrong + missing)
@@ -32,12 +31,20 @@ def verdict(robot: str, sources: list[doc.Source], published: list[doc.Published
     if accepted:
         sentence += f", {accepted} deviations as accepted"
     sentence += _for_all(compared)
-    for status, names in aside.items():
-        if names:
-            sentence += f"; {status}: {', '.join(names)}"
-    if settings.not_chosen:
-        sentence += f"; not chosen: {', '.join(settings.not_chosen)}"
+    sentence += _asides(sources, settings)
     return doc.Verdict(exit_code=0, sentence=sentence)
+
+
+def _asides(sources: list[doc.Source], settings: doc.Settings) -> str:
+    """What was not compared, so that nobody takes it for agreement."""
+    text = ""
+    for status in ("not run", "failed"):
+        if names := [s.name for s in sources if s.status == status and not s.required]:
+            text += f"; {status}: {', '.join(names)}"
+    for source in sources:
+        if source.required and source.status == "ran" and "without" in source.mapping:
+            text += f"; {source.name} was compared {source.mapping}"
+    return f"{text}; not chosen: {', '.join(settings.not_chosen)}" if settings.not_chosen else text
 
 
 def _for_all(compared: list[doc.Source]) -> str:

@@ -46,8 +46,3 @@ class Options:
             raise InputError(f"expected 0 <= seed < 2^64, got {self.seed}")
         if self.jobs < 0:
             raise InputError(f"expected jobs >= 0, got {self.jobs}")
-        for name, value in (("start timeout", self.limits.start), ("block timeout", self.limits.block)):
-            if not value > 0.0:
-                raise InputError(f"expected a {name} > 0 s, got {value}")
-        if self.limits.memory <= 0:
-            raise InputError(f"expected a memory limit > 0, got {self.limits.memory}")

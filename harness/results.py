@@ -54,7 +54,7 @@ class Results:
     options: Options
     participants: list[Participant]
     offsets: dict[str, Array] = field(default_factory=dict)
-    measured_from: str = ""
+    measured_from: dict[str, str] = field(default_factory=dict)
     in_house: Bound | None = None
     comparison: Comparison | None = None
     reproduced: dict[str, Reproduced] = field(default_factory=dict)

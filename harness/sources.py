@@ -6,6 +6,7 @@ import contextlib
 import fnmatch
 from collections.abc import Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -87,7 +88,9 @@ def plan(model: RobotModel, options: Options) -> list[Planned]:
             f"{model.name}: nothing to compare with the reference {options.reference}",
             hint=f"choose among: {', '.join(entries)}",
         )
-    _check_accepted(model, {*entries, *commands, *registered()})
+    known = {*entries, *commands, *registered()}
+    _check_accepted(model, known)
+    _check_engine_names(model, known)
     return planned
 
 
@@ -110,6 +113,15 @@ def _check_known(name: str, commands: Mapping[str, tuple[str, ...]]) -> None:
             adapter_of(name)
     elif name in registered():
         raise InputError("this is the name of an engine; give the command another", key=name)
+
+
+def _check_engine_names(model: RobotModel, known: set[str]) -> None:
+    """Refuse what looks like a misspelt engine. A name that nothing is like may be that of a program given with --worker."""
+    for name in model.engine_names:
+        if name not in known and (set(name) & set("*?[") or not name.strip() or get_close_matches(name, known, 1, 0.75)):
+            raise MappingError(
+                f"no source {name!r}; {nearest(name, known)}", where=model.folder / "frames.toml", key=f'engine."{name}"'
+            )
 
 
 def _check_accepted(model: RobotModel, known: set[str]) -> None:

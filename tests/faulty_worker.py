@@ -15,15 +15,18 @@ from typing import cast
 import numpy as np
 
 from harness.description.dh import DHTable
+from harness.description.urdf import UrdfText
 from harness.engines.dh_numpy import DHNumpy
 from harness.engines.protocol import decode
+from harness.engines.urdf_pinocchio import UrdfPinocchio
 from harness.se3 import Array
 
 FAULT = sys.argv[1] if len(sys.argv) > 1 else "none"
+LINKS = ("base", "wrist_3_link", "tool0")
 BLOCKS_BEFORE = 2  # answered well before a fault in a block
 
 
-def say(message: dict[str, object]) -> None:
+def say(message: object) -> None:
     write(json.dumps(message).encode() + b"\n")
 
 
@@ -32,23 +35,43 @@ def write(data: bytes) -> None:
     sys.stdout.buffer.flush()
 
 
-def at_the_start() -> None:
-    if FAULT == "exits at once":
-        print("no licence found", file=sys.stderr)
-        sys.exit(7)
-    if FAULT == "sleeps at the start":
-        time.sleep(1000)
-    if FAULT == "sleeps at the start with a child":
-        subprocess.run([sys.executable, "-c", "import time; time.sleep(1000)"], check=False)
-    if FAULT == "prints rubbish":
-        write(b"Loading controller firmware v3 ...\n")
-    if FAULT == "refuses":
-        say({"error": "this controller is for another robot"})
-        sys.exit(1)
-    if FAULT == "another version":
-        say({"protocol": "fk-crosscheck", "version": 2, "joints": ["a"], "frames": ["1"]})
-    if FAULT == "no end of line":
-        write(b"x" * 20_000_000)
+def no_licence() -> None:
+    print("no licence found", file=sys.stderr)
+    sys.exit(7)
+
+
+def broken_letters() -> None:
+    sys.stderr.buffer.write("\uffff \x1b[31m broken".encode())
+    sys.exit(5)
+
+
+def leaves_a_daemon() -> None:
+    subprocess.Popen(["sleep", "30"], start_new_session=True)
+    os._exit(7)
+
+
+def refuses() -> None:
+    say({"error": "this controller is for another robot"})
+    sys.exit(1)
+
+
+AT_THE_START: dict[str, Callable[[], object]] = {
+    "exits at once": no_licence,
+    "sleeps at the start": lambda: time.sleep(1000),
+    "sleeps at the start with a child": lambda: subprocess.run(
+        [sys.executable, "-c", "import time; time.sleep(1000)"], check=False
+    ),
+    "prints rubbish": lambda: write(b"Loading controller firmware v3 ...\n"),
+    "refuses": refuses,
+    "another version": lambda: say({"protocol": "fk-crosscheck", "version": 2, "joints": ["a"], "frames": ["1"]}),
+    "no end of line": lambda: write(b"x" * 20_000_000),
+    "answers with a list": lambda: say([1]),
+    "refuses without words": lambda: say({"error": None}),
+    "refuses in unwritable letters": lambda: say({"error": "\ud800 \uffff \x1b[31m boom"}),
+    "names half a letter": lambda: say({"protocol": "fk-crosscheck", "version": 1, "joints": ["\ud800"], "frames": ["1"]}),
+    "writes unwritable letters to stderr": broken_letters,
+    "leaves a daemon": leaves_a_daemon,
+}
 
 
 def exits(count: int) -> None:
@@ -91,9 +114,14 @@ def reports_a_failure(count: int) -> None:
     say({"error": "joint 3 outside its limits"})
 
 
+def killed_by_a_nameless_signal(count: int) -> None:
+    os.kill(os.getpid(), 35)
+
+
 IN_A_BLOCK: dict[str, Callable[[int], None]] = {
     "exits in a block": exits,
     "segfaults": segfaults,
+    "killed by a nameless signal": killed_by_a_nameless_signal,
     "aborts": lambda count: os.abort(),
     "sleeps in a block": lambda count: time.sleep(1000),
     "prints in a block": lambda count: write(b"warning: singularity near\n"),
@@ -124,20 +152,32 @@ def bent(T: Array, previous: Array | None) -> Array:
 def main() -> None:
     source = sys.stdin.buffer
     greeting = json.loads(source.readline())
-    at_the_start()
-    engine = DHNumpy(cast(DHTable, decode(greeting["description"])))
-    say({"protocol": "fk-crosscheck", "version": 1, "joints": engine.joints, "frames": engine.frames})
+    if FAULT in AT_THE_START:
+        AT_THE_START[FAULT]()
+    description = decode(greeting["description"])
+    engine = DHNumpy(description) if isinstance(description, DHTable) else UrdfPinocchio(cast(UrdfText, description))
+    frames = {"misspells a frame": ("base", "0", "1", "thre", "6"), "has the flange only": ("6",), "has a few links": LINKS}.get(
+        FAULT, engine.frames
+    )
+    say({"protocol": "fk-crosscheck", "version": 1, "joints": engine.joints, "frames": frames})
+    seconds = {"negative seconds": -5.0, "endless seconds": float("inf")}.get(FAULT, 0.0)
     previous, blocks = None, 0
     while head := source.read(8):
         count = int(struct.unpack("<d", head)[0])
+        if FAULT == "answers before it has read":
+            write(struct.pack("<d", count))
         q = np.frombuffer(source.read(8 * count * len(engine.joints)), "<f8").reshape(count, -1)
+        if FAULT == "dies beyond the limits" and np.abs(q).max() > 6.5:
+            sys.exit(9)
+        if FAULT == "clamps":
+            q = np.clip(q, -3.0, 3.0)
         blocks += 1
         if blocks > BLOCKS_BEFORE:
             if FAULT in IN_A_BLOCK:
                 IN_A_BLOCK[FAULT](count)
             if FAULT == "reports a failure":
                 continue
-        T = engine.placements(q, engine.frames)
+        T = engine.placements(q, ["6"] * len(frames) if FAULT == "misspells a frame" else frames)
         answer = bent(T.copy(), previous) if blocks > BLOCKS_BEFORE else T
         previous = T
         if FAULT == "big-endian":
@@ -145,7 +185,10 @@ def main() -> None:
         elif FAULT == "float32":
             write(np.array([count, 0.0, *answer.ravel()], "<f4").tobytes())
         else:
-            write(struct.pack("<2d", count, 0.0) + np.ascontiguousarray(answer).tobytes())
+            head = struct.pack("<2d", count, seconds)[8 * (FAULT == "answers before it has read") :]
+            write(head + np.ascontiguousarray(answer).tobytes())
+    if FAULT == "talks at the end":
+        floods_stderr(0)
     if FAULT == "does not end":
         time.sleep(1000)
 

@@ -77,8 +77,7 @@ def build(workers: Workers) -> Iterator[Build]:
         return built[-1]
 
     yield start
-    for engine in built:
-        workers.release(engine)
+    workers.settle(built)
 
 
 def urdf(*joints: str) -> Urdf:

@@ -17,7 +17,7 @@ from harness.engines import environments, install
 from harness.engines.base import Engine
 from harness.engines.dh_pinocchio import DHPinocchio
 from harness.engines.environments import Installed, Manifest, cache_folder, read_manifest, where, write_manifest
-from harness.errors import EngineUnavailable
+from harness.errors import EngineUnavailable, InputError
 from harness.se3 import Array
 
 
@@ -92,6 +92,22 @@ def test_a_damaged_manifest_counts_as_none(cache: Path, text: str) -> None:
     (cache / "environments.json").write_bytes(text.encode("latin-1"))
     assert read_manifest() == Manifest()
     assert reason(Wants) == "acme-fk is not installed"
+
+
+def test_another_python_sees_nothing_of_this_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sourced ROS workspace sets PYTHONPATH in every shell."""
+    for name in ("PYTHONPATH", "PYTHONHOME"):
+        monkeypatch.setenv(name, "/opt/ros")
+    assert environments.own_environment(sys.executable)["PYTHONPATH"] == "/opt/ros"
+    other = environments.own_environment("/elsewhere/python")
+    assert not {"PYTHONPATH", "PYTHONHOME"} & set(other)
+    assert other["PYTHONNOUSERSITE"] == "1"
+
+
+def test_an_unusable_cache_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FK_CROSSCHECK_CACHE", "/dev/null/x")
+    with pytest.raises(InputError, match=r"cannot be written to: .*; set FK_CROSSCHECK_CACHE to a folder that can be"):
+        install.install([Wants], None, lambda text: None)
 
 
 def test_packages_of_the_system() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from harness.errors import CrosscheckError, DescriptionUnavailable, InputError, 
 from harness.options import Options
 from harness.sources import deviation_on_file, plan
 from tests.conftest import Edit
+from tests.helpers import crosscheck
 
 NINE = ["humanoid_arm", "iiwa14", "panda", "sixr", "stanford", "ur10", "ur3", "ur5", "ur5e"]
 
@@ -163,6 +165,43 @@ def test_an_accepted_deviation_may_be_for_all_urdf_sources_or_one_not_listed(mod
     assert on_file[0].position == 0.00087248
     assert deviation_on_file(models["iiwa14"], "dh:pinocchio", "dh:numpy", "tool0") is None
     assert deviation_on_file(models["ur5"], "dh:roboticstoolbox-packaged", "dh:numpy", "tool0") is not None
+
+
+def test_offsets_of_rigid_frames_come_from_whichever_source_has_them(models: dict[str, RobotModel]) -> None:
+    """What the first source lacks is measured with the next, and not taken to be no offset at all."""
+    command = (sys.executable, str(Path(__file__).parent / "faulty_worker.py"), "has a few links")
+    partial = (("urdf:controller", command),)
+    options = Options(20, 0, ("urdf:controller", "urdf:pinocchio"), workers=partial, certify=False)
+    report = crosscheck(models["ur3"], options)
+    assert report.verdict.exit_code == 0
+    measured = {f.name: f.measured_from for f in report.frames if f.relation == "rigid"}
+    assert measured.pop("wrist_3_link") == "urdf:controller"
+    assert set(measured.values()) == {"urdf:pinocchio"}
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("urdf:ikpi", "no source 'urdf:ikpi'; did you mean 'urdf:ikpy'"),
+        ("urdf:*", "no source 'urdf:"),
+        ("dh:numpi", "did you mean 'dh:numpy'"),
+    ],
+)
+def test_a_misspelt_engine_in_the_mapping(copy_model: Callable[..., Path], name: str, message: str) -> None:
+    folder = copy_model("ur5")
+    with (folder / "frames.toml").open("a") as file:
+        file.write(f'[engine."{name}"]\nwithout = []\n')
+    with pytest.raises(InputError, match=message):
+        plan(load_model(folder), Options())
+
+
+def test_the_reference_may_not_be_without_a_frame(copy_model: Callable[..., Path]) -> None:
+    folder = copy_model("ur5")
+    with (folder / "frames.toml").open("a") as file:
+        file.write('[engine."dh:numpy"]\nwithout = ["shoulder_link"]\n')
+    report = crosscheck(load_model(folder), Options(5, 0, ("dh:pinocchio",)))
+    assert report.verdict.exit_code == 3
+    assert "cannot be the reference: it does not have shoulder_link" in report.verdict.sentence
 
 
 @pytest.mark.parametrize(

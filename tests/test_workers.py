@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import psutil
@@ -63,6 +64,18 @@ def _nothing_left() -> Iterator[None]:
         ("none", "agrees", 0, ""),
         ("floods stderr", "agrees", 0, ""),
         ("does not end", "agrees", 0, ""),
+        ("negative seconds", "agrees", 0, ""),
+        ("endless seconds", "agrees", 0, ""),
+        ("answers before it has read", "agrees", 0, ""),
+        ("has the flange only", "agrees", 0, ""),
+        ("misspells a frame", "failed", 3, "has a frame 'thre': "),
+        ("answers with a list", "failed", 3, "expected its answer, a JSON object, got '[1]'"),
+        ("refuses without words", "failed", 3, "refused, but not why"),
+        ("refuses in unwritable letters", "failed", 3, "boom"),
+        ("names half a letter", "failed", 3, "half of a surrogate pair"),
+        ("writes unwritable letters to stderr", "failed", 3, "exited with code 5"),
+        ("leaves a daemon", "failed", 3, "exited with code 7"),
+        ("killed by a nameless signal", "failed", 3, "killed by signal 35"),
         ("exits at once", "failed", 3, "at the start: exited with code 7; stderr ends: no licence found"),
         ("sleeps at the start", "failed", 3, "at the start: did not answer within 5 s"),
         ("sleeps at the start with a child", "failed", 3, "at the start: did not answer within 5 s"),
@@ -76,8 +89,8 @@ def _nothing_left() -> Iterator[None]:
         ("sleeps in a block", "failed", 3, "did not answer within 5 s"),
         ("prints in a block", "failed", 3, "expected the count 823, got 'warning:': does it print to stdout?"),
         ("closes stdout", "failed", 3, "closed its stdout and went on running"),
-        ("allocates without end", "failed", 3, "GiB of memory, 0.4 GiB are allowed"),
-        ("allocates in a child", "failed", 3, "GiB of memory, 0.4 GiB are allowed"),
+        ("allocates without end", "failed", 3, "MiB of memory, 400 MiB are allowed"),
+        ("allocates in a child", "failed", 3, "MiB of memory, 400 MiB are allowed"),
         ("reports a failure", "failed", 3, "joint 3 outside its limits"),
         ("big-endian", "failed", 3, "write little-endian"),
         ("float32", "failed", 3, "expected the count 4096 as float64, got it as float32"),
@@ -102,6 +115,59 @@ def test_faults(models: dict[str, RobotModel], tmp_path: Path, fault: str, verdi
     assert named(report, "dh:pinocchio").verdict == "agrees"
     write_report(report, tmp_path)
     assert read_report(tmp_path / "ur3.json") == report
+    ElementTree.parse(tmp_path / "ur3.junit.xml")
+
+
+def in_model_toml(copy_model: Callable[..., Path], fault: str, frames: str = "") -> RobotModel:
+    command = f'command = ["{sys.executable}", "{WORKER}", "{fault}"]'
+    source = f'[[source]]\nname = "controller"\n{command}\n\n[[source]]\nname = "dh:pinocchio"\n'
+    folder = copy_model("ur3", ("model.toml", '[[source]]\nname = "dh:pinocchio"\n', source))
+    with (folder / "frames.toml").open("a") as file:
+        file.write(frames)
+    return load_model(folder)
+
+
+def test_frames_that_a_program_does_not_have(models: dict[str, RobotModel], copy_model: Callable[..., Path]) -> None:
+    """Given by hand, the verdict names them; in model.toml they must be declared; a reference must have all."""
+    options = {"samples": 10, "sources": ("dh:pinocchio", "controller"), "certify": False}
+    by_hand = with_fault(models["ur3"], "has the flange only", samples=10)
+    assert "controller was compared without base, base_link, world, shoulder_link," in by_hand.verdict.sentence
+    model = in_model_toml(copy_model, "has the flange only")
+    refused = crosscheck(model, Options(**options))  # type: ignore[arg-type]
+    assert refused.verdict.exit_code == 3
+    assert 'if that is meant: frames.toml, [engine."controller"] without = [' in named(refused, "controller").reason
+    lacking = ", ".join(f'"{frame.name}"' for frame in model.frames.frames if frame.dh != "6")
+    with (model.folder / "frames.toml").open("a") as file:
+        file.write(f'[engine."controller"]\nwithout = [{lacking}]\n')
+    assert crosscheck(load_model(model.folder), Options(**options)).verdict.exit_code == 0  # type: ignore[arg-type]
+    reference = with_fault(models["ur3"], "has the flange only", samples=10, reference="controller")
+    assert reference.verdict.exit_code == 3
+    assert "controller is required and failed: cannot be the reference: it does not have base," in reference.verdict.sentence
+
+
+def test_one_that_dies_while_it_is_certified_has_failed(models: dict[str, RobotModel]) -> None:
+    report = with_fault(models["ur3"], "dies beyond the limits", samples=10, certify=True)
+    assert (named(report, "controller").verdict, report.verdict.exit_code) == ("failed", 3)
+    assert "exited with code 9" in named(report, "controller").reason
+    assert named(report, "dh:pinocchio").verdict == "agrees"
+
+
+def test_a_narrow_pipe(models: dict[str, RobotModel], monkeypatch: pytest.MonkeyPatch) -> None:
+    """q does not fit the pipe, and the answer begins before it is read."""
+    monkeypatch.setattr("harness.engines.child._widen", lambda fd: None)
+    assert with_fault(models["ur3"], "answers before it has read", samples=4096).verdict.exit_code == 0
+
+
+def test_nothing_is_held_of_robots_that_are_done(models: dict[str, RobotModel]) -> None:
+    """Neither processes nor pipes, of programs that ran, failed or were refused; engines wait for the next robot."""
+    open_files = psutil.Process().num_fds
+    with Workers(LIMITS) as workers:
+        counts = []
+        for fault in ("none", "refuses", "misspells a frame", "none", "exits at once"):
+            options = Options(5, 0, ("dh:pinocchio",), certify=False, workers=(("controller", (sys.executable, WORKER, fault)),))
+            crosscheck(models["ur3"], options, None, workers)
+            counts.append((open_files(), len([p for p in below() if WORKER in " ".join(p.cmdline())])))
+        assert counts == [(counts[0][0], 0)] * 5
 
 
 def test_an_optional_one_that_fails_does_not_fail_the_gate_and_is_named(copy_model: Callable[..., Path]) -> None:
@@ -140,6 +206,7 @@ def in_run(expected: int) -> None:
 
 def test_a_worker_serves_one_robot_after_the_other(models: dict[str, RobotModel]) -> None:
     """The same process; and after it has died, another."""
+    others = {p.pid for p in below()}
     with Workers() as workers:
         served = []
         for robot in ("ur3", "panda", "stanford"):
@@ -147,8 +214,8 @@ def test_a_worker_serves_one_robot_after_the_other(models: dict[str, RobotModel]
             engine = workers.load(DHPinocchio, description, description.frames)
             q = np.full((3, len(description.joints)), 0.3)
             assert_placements_close(engine.placements(q, engine.frames), DHNumpy(description).placements(q, engine.frames), 1e-13)
-            workers.release(engine)
-            (worker,) = (p for p in below() if "worker.py" in " ".join(p.cmdline()))
+            workers.settle([engine])
+            (worker,) = (p for p in below() if p.pid not in others and "worker.py" in " ".join(p.cmdline()))
             served.append(worker.pid)
             if robot == "panda":
                 worker.kill()
@@ -160,14 +227,14 @@ def test_a_worker_serves_one_robot_after_the_other(models: dict[str, RobotModel]
     ("options", "message"),
     [
         ({"jobs": -1}, "expected jobs >= 0"),
-        ({"limits": Limits(start=0.0)}, "expected a start timeout > 0 s"),
-        ({"limits": Limits(block=float("nan"))}, "expected a block timeout > 0 s"),
-        ({"limits": Limits(memory=0)}, "expected a memory limit > 0"),
+        ({"start": 0.0}, "expected a start timeout above 0"),
+        ({"block": float("nan")}, "expected a block timeout above 0"),
+        ({"memory": float("inf")}, "expected a memory limit above 0"),
     ],
 )
 def test_impossible_options(options: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        Options(**options)
+        Options(**options) if "jobs" in options else Limits(**options)
 
 
 @pytest.mark.parametrize(
@@ -179,10 +246,14 @@ def test_impossible_options(options: dict[str, Any], message: str) -> None:
         ("column-major", 1, "the last column is 0 0 0 1 instead: write rows first, or transpose each matrix"),
         ("nan", 1, "WRONG placements are finite"),
         ("not a rotation", 1, "WRONG rotations are rotations"),
-        ("the previous block", 1, "it keeps state between configurations or blocks"),
+        ("the previous block", 1, "it keeps state, or orders them by frame first"),
         ("too many frames", 1, "more than it was asked for"),
         ("segfaults", 1, "killed by SIGSEGV"),
         ("does not end", 1, "it went on running for 5 s"),
+        ("talks at the end", 0, "ok    ends with exit code 0 when its stdin ends"),
+        ("clamps", 1, "a whole turn more of every joint changes a placement"),
+        ("misspells a frame", 1, "has a frame 'thre'"),
+        ("has the flange only", 0, "ok    knows the joints and frames of ur5, all but base, base_link"),
     ],
 )
 def test_worker_check(cli: Callable[..., subprocess.CompletedProcess[str]], fault: str, code: int, text: str) -> None:

@@ -20,6 +20,7 @@ from typing import Any
 import psutil
 
 TAIL = 4096
+LOOK_UP = 0.5  # seconds between two looks at whether it still runs
 LONGEST_LINE = 16_000_000
 PIPE_BYTES = 1 << 20
 _F_SETPIPE_SZ = 1031  # Linux: a large pipe saves waking up for every 64 KiB
@@ -45,7 +46,7 @@ class Child:
             self.process = subprocess.Popen(command, bufsize=0, stdin=pipe, stdout=pipe, stderr=pipe, cwd=cwd, env=env, **joining)
         except (OSError, ValueError, subprocess.SubprocessError) as error:
             raise ChildError(f"cannot start {command[0]!r}: {error}") from error
-        self.command, self.over = tuple(command), ""
+        self.command, self.cwd, self.over = tuple(command), cwd, ""
         self._tail = b""
         self._surplus = b""  # what came behind a line
         self._selector = selectors.DefaultSelector()
@@ -98,22 +99,24 @@ class Child:
 
     def _converse(self, data: memoryview, take: Callable[[], bool], timeout: float, so_far: Callable[[], str]) -> None:
         """Write `data` while reading, so that neither side waits for a full pipe, until `take` has all it wants."""
-        end = time.monotonic() + timeout
+        end, taken = time.monotonic() + timeout, False
         if len(data):
             self._selector.register(self._stdin, selectors.EVENT_WRITE)
         try:
-            while True:
+            while not taken or len(data):
                 left = end - time.monotonic()
-                ready = self._selector.select(max(left, 0.0))
+                ready = self._selector.select(min(max(left, 0.0), LOOK_UP))
                 if not ready and left <= 0.0:
                     raise ChildError(self._story(f"did not answer within {timeout:.3g} s", so_far()))
+                if not ready and self.process.poll() is not None:
+                    raise EOFError  # it has ended, and something it started holds on to the pipe
                 for key, _ in ready:
                     if key.fd == self._stderr:
                         self._drain()
                     elif key.fd == self._stdin:
                         data = self._write(data)
-                    elif take():
-                        return
+                    elif not taken:
+                        taken = take()
         except EOFError:
             raise ChildError(self._story(self._how_it_ended(), so_far())) from None
         finally:
@@ -146,9 +149,7 @@ class Child:
             return "closed its stdout and went on running"
         if self.over:
             return self.over
-        if code < 0:
-            return f"killed by {signal.Signals(-code).name} ({signal.strsignal(-code)})"
-        return f"exited with code {code}"
+        return ending(code)
 
     def _story(self, what: str, so_far: str) -> str:
         while self._stderr in self._selector.get_map() and select.select([self._stderr], [], [], 0.0)[0]:
@@ -164,13 +165,19 @@ class Child:
         """Close its stdin and wait for it to end by itself. Returns its exit code, None if it goes on."""
         if self.process.stdin is not None:
             self.process.stdin.close()
-        try:
-            return self.process.wait(timeout)
-        except subprocess.TimeoutExpired:
-            return None
+        end = time.monotonic() + timeout
+        while self.process.poll() is None and time.monotonic() < end:
+            for key, _ in self._selector.select(0.1):  # what it still says must not keep it waiting
+                if key.fd == self._stderr:
+                    self._drain()
+                elif not os.read(self._stdout, 65536):
+                    self._selector.unregister(self._stdout)
+        return self.process.poll()
 
     def kill(self) -> None:
-        """End it and everything it has started."""
+        """End it and everything it has started; nothing if it has ended: its number may be another's by now."""
+        if self.process.poll() is not None:
+            return
         with contextlib.suppress(psutil.Error):
             for process in psutil.Process(self.process.pid).children(recursive=True):
                 with contextlib.suppress(psutil.Error):
@@ -185,6 +192,16 @@ class Child:
         for stream in (self.process.stdin, self.process.stdout, self.process.stderr):
             if stream is not None:
                 stream.close()
+
+
+def ending(code: int) -> str:
+    """How a process ended, by its exit code as Python tells it."""
+    if code >= 0:
+        return f"exited with code {code}"
+    try:
+        return f"killed by {signal.Signals(-code).name} ({signal.strsignal(-code)})"
+    except ValueError:  # a real-time signal has no name
+        return f"killed by signal {-code}"
 
 
 def _widen(fd: int) -> None:

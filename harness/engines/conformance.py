@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from harness.engines import protocol
 from harness.engines.process import ProcessEngine
@@ -25,7 +26,7 @@ class Finding:
     problem: str = ""
 
 
-def examine(engine: ProcessEngine) -> Iterator[Finding]:
+def examine(engine: ProcessEngine, turning: Sequence[bool]) -> Iterator[Finding]:
     """Check a worker that has answered its greeting, one requirement after the other; stops at the first that ends it."""
     rng = np.random.default_rng(0)
     q = rng.uniform(-1.0, 1.0, (protocol.MAX_BLOCK, len(engine.joints)))
@@ -44,7 +45,7 @@ def examine(engine: ProcessEngine) -> Iterator[Finding]:
         ("rotations are rotations", lambda: _rotations(engine, asked[protocol.MAX_BLOCK])),
         ("an answer depends on its own q alone", lambda: _stateless(engine, q, asked)),
         ("joints move something", lambda: _moving(engine, asked[protocol.MAX_BLOCK])),
-        ("takes values beyond the joint limits", lambda: _beyond(engine, q)),
+        ("takes values beyond the joint limits", lambda: _beyond(engine, q, np.array(turning))),
     ]
     for what, check in checks:
         try:
@@ -91,7 +92,7 @@ def _stateless(engine: ProcessEngine, q: Array, asked: dict[int, Array]) -> str:
     for rows in ([0], [2], [2, 1, 0], [protocol.MAX_BLOCK - 1]):
         again = engine.placements(q[rows], engine.frames)
         if (off := np.abs(again - whole[rows]).max()) > SAME:
-            return f"configurations {rows} asked for again differ by {off:.2g}: it keeps state between configurations or blocks"
+            return f"configurations {rows} asked for again differ by {off:.2g}: it keeps state, or orders them by frame first"
     return ""
 
 
@@ -99,8 +100,12 @@ def _moving(engine: ProcessEngine, T: Array) -> str:
     return "no frame moves, whatever q is" if np.abs(T - T[:1]).max() <= SAME else ""
 
 
-def _beyond(engine: ProcessEngine, q: Array) -> str:
-    far = engine.placements(10.0 * q[:8], engine.frames)
-    return (
-        "" if np.isfinite(far).all() else "not finite there: forward kinematics has no limits, and certificates need it without"
-    )
+def _beyond(engine: ProcessEngine, q: Array, turning: NDArray[np.bool_]) -> str:
+    """A turn more must change nothing; a joint that slides is moved by a metre."""
+    reason = "forward kinematics has no limits, and the proof for all configurations needs it without"
+    near, far = engine.placements(q[:8], engine.frames), engine.placements(q[:8] + 2 * np.pi * turning, engine.frames)
+    further = engine.placements(q[:8] + np.where(turning, -20 * np.pi, 1.0), engine.frames)
+    if not (np.isfinite(far).all() and np.isfinite(further).all()):
+        return f"not finite there: {reason}"
+    off = float(np.abs(far - near).max())
+    return f"a whole turn more of every joint changes a placement by {off:.2g}: does it clamp? {reason}" if off > VALID else ""

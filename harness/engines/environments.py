@@ -107,12 +107,21 @@ def debian_versions(packages: tuple[str, ...]) -> dict[str, str]:
     return dict(line.split(" ", 1) for line in result.stdout.splitlines() if line.count(" ") == 1 and line.split(" ")[1])
 
 
+def own_environment(python: str) -> dict[str, str]:
+    """Variables for another interpreter: none that would put this one's packages, or the user's, into its path."""
+    if python == sys.executable:
+        return dict(os.environ)
+    foreign = ("PYTHONPATH", "PYTHONHOME", "PYTHONSTARTUP", "VIRTUAL_ENV")
+    return {**{k: v for k, v in os.environ.items() if k not in foreign}, "PYTHONNOUSERSITE": "1"}
+
+
 @lru_cache(maxsize=16)
 def system_problem(imports: tuple[str, ...]) -> str:
     """Why the system's Python cannot import these modules; empty if it can."""
     command = [SYSTEM_PYTHON, "-c", f"import {', '.join(imports)}"]
     try:
-        result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        env = own_environment(SYSTEM_PYTHON)
+        result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, env=env)
     except (OSError, subprocess.SubprocessError) as error:
         return f"the system's Python does not run: {error}"
     lines = result.stderr.strip().splitlines()

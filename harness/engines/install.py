@@ -28,6 +28,7 @@ from harness.engines.environments import (
     Installed,
     cache_folder,
     debian_versions,
+    own_environment,
     read_manifest,
     system_problem,
     write_manifest,
@@ -35,7 +36,7 @@ from harness.engines.environments import (
 from harness.engines.protocol import Description
 from harness.engines.requirements import unmet
 from harness.engines.workers import Workers
-from harness.errors import CrosscheckError
+from harness.errors import CrosscheckError, InputError
 
 Say: TypeAlias = Callable[[str], None]
 
@@ -67,9 +68,14 @@ def install(adapters: Sequence[type[Engine]], constraints: Path | None, say: Say
 
 @contextmanager
 def _locked() -> Iterator[None]:
-    """One installation at a time: a second one waits."""
-    cache_folder().mkdir(parents=True, exist_ok=True)
-    with (cache_folder() / "lock").open("w") as lock:
+    """One installation at a time: a second one waits. Raises InputError if the cache folder cannot be written to."""
+    try:
+        cache_folder().mkdir(parents=True, exist_ok=True)
+        lock = (cache_folder() / "lock").open("w")
+    except OSError as error:
+        hint = "set FK_CROSSCHECK_CACHE to a folder that can be"
+        raise InputError(f"cannot be written to: {error.strerror}", where=cache_folder(), hint=hint) from None
+    with lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
 
@@ -120,9 +126,9 @@ def _constraint(constraints: Path | None) -> list[str]:
 
 def _freeze(folder: Path) -> list[str]:
     """Hold pip to what is installed in an environment."""
-    result = subprocess.run(
-        [str(folder / "bin" / "python"), "-m", "pip", "list", "--format", "freeze"], capture_output=True, text=True, check=False
-    )
+    python = str(folder / "bin" / "python")
+    command = [python, "-m", "pip", "list", "--format", "freeze"]
+    result = subprocess.run(command, capture_output=True, text=True, check=False, env=own_environment(python))
     path = folder / "frozen.txt"
     path.write_text(result.stdout)
     return ["--constraint", str(path)]
@@ -144,7 +150,8 @@ def _versions(python: str, adapter: type[Engine]) -> dict[str, str]:
     """What came of each requirement."""
     names = [Requirement(text).name for text in adapter.requirements]
     code = "import sys; from importlib.metadata import version; [print(n, version(n)) for n in sys.argv[1:]]"
-    result = subprocess.run([python, "-c", code, *names], capture_output=True, text=True, check=False)
+    command = [python, "-c", code, *names]
+    result = subprocess.run(command, capture_output=True, text=True, check=False, env=own_environment(python))
     return dict(line.split(" ", 1) for line in result.stdout.splitlines())
 
 
@@ -167,6 +174,7 @@ def _try_out(adapter: type[Engine], python: str = SYSTEM_PYTHON) -> str:
 
 def _run(command: list[str], env: dict[str, str] | None = None) -> str:
     """Run a command quietly. Returns why it failed, empty if it did not."""
+    env = env or own_environment(command[0])
     try:
         result = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, check=False, env=env)
     except (OSError, subprocess.SubprocessError) as error:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import threading
 import time
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,17 +17,25 @@ from pydantic import BaseModel, ValidationError, field_validator
 from harness.engines import protocol
 from harness.engines.base import Engine
 from harness.engines.child import Child, ChildError
-from harness.errors import EngineFailed, EngineUnavailable
+from harness.errors import EngineFailed, EngineUnavailable, InputError
 from harness.se3 import Array
+
+LONGEST_TEXT = 2000
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a worker may take: seconds to answer the greeting, seconds a block, bytes of memory."""
+    """What a worker may take: seconds to answer the greeting, seconds a block, bytes of memory. Raises InputError."""
 
     start: float = 120.0
     block: float = 120.0
-    memory: int = 4 << 30
+    memory: float = 4 * 2**30
+
+    def __post_init__(self) -> None:
+        """Refuse what is no limit."""
+        for name, value in (("start timeout", self.start), ("block timeout", self.block), ("memory limit", self.memory)):
+            if not 0.0 < value < math.inf:
+                raise InputError(f"expected a {name} above 0 and finite, got {value:g}")
 
 
 class Answer(BaseModel):
@@ -58,16 +68,9 @@ class Answer(BaseModel):
     def _distinct(cls, value: list[str]) -> list[str]:
         if not value:
             raise ValueError("expected at least one name, got none")
-        if twice := [name for name in value if value.count(name) > 1]:
-            raise ValueError(f"{twice[0]!r} is there twice")
+        if twice := next((name for name, count in Counter(value).items() if count > 1), None):
+            raise ValueError(f"{twice!r} is there twice")
         return value
-
-
-class Refusal(BaseModel):
-    """A worker's answer if it cannot: `unavailable` if its library is not there."""
-
-    error: str
-    unavailable: bool = False
 
 
 class ProcessEngine(Engine):
@@ -81,9 +84,11 @@ class ProcessEngine(Engine):
         self.source = source
         self.traits = adapter.traits if adapter else ()
         self.partial = adapter.partial if adapter else True
+        self.is_program = adapter is None
         self.child, self._limits = child, limits
         self._lock = threading.Lock()
         self.seconds = self.waited = 0.0
+        self.died = ""  # how its process came to an end, if it did
         start = time.perf_counter()
         answer = self._greet(greeting)
         self.started_in = time.perf_counter() - start
@@ -134,39 +139,60 @@ class ProcessEngine(Engine):
             except ChildError as error:
                 self.idle = False
                 self.child.kill()
-                raise EngineFailed(self.source, f"in a block of {len(q)}: {error}") from error
+                self.died = f"in a block of {len(q)}: {error}"
+                raise EngineFailed(self.source, self.died) from error
             finally:
                 self.waited += time.perf_counter() - start
-            self.seconds += float(back[1]) if np.isfinite(back[1]) else 0.0
+            if 0.0 <= back[1] <= self.waited:  # what cannot be is as good as not measured
+                self.seconds += float(back[1])
         return np.asarray(back[2:].reshape(len(q), len(self.frames), 4, 4), dtype=np.float64)
 
     def _check_count(self, count: float, expected: int) -> None:
         """Raise EngineFailed with the worker's own reason, or ChildError if the count is not the one asked for."""
         if count == protocol.FAILED:
-            text = self.child.line(b"", self._limits.block)
-            try:
-                raise EngineFailed(self.source, Refusal.model_validate_json(text).error)
-            except ValidationError:
-                raise ChildError(f"reported a failure, but not why: {text[:80]!r}") from None
+            reason = _error(_parsed(self.child.line(b"", self._limits.block)))
+            if reason is None:
+                raise ChildError('reported a failure, but not why: expected {"error": "why"}')
+            raise EngineFailed(self.source, reason)
         if count != expected:
             raise ChildError(explain_count(count, expected))
 
 
+def _parsed(text: bytes) -> Any:
+    """A line of JSON, None if it is none."""
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+
+
+def _error(message: Any) -> str | None:
+    """The text under `error`, cut to a length and to characters that can be written anywhere; None if there is none."""
+    if not isinstance(message, Mapping) or not isinstance(message.get("error"), str):
+        return None
+    return str(message["error"])[:LONGEST_TEXT].encode("utf-8", "replace").decode() or "it gave no reason"
+
+
 def read_answer(text: bytes) -> Answer:
-    """Parse the answer line. Raises ValueError, EngineUnavailable; EngineFailed is a ValueError here with its reason."""
+    """Parse the answer line. Raises ValueError with what is wrong or the worker's own reason, or EngineUnavailable."""
+    message = _parsed(text)
+    if message is None:
+        got = text[:60].decode(errors="replace")
+        raise ValueError(f"expected its answer, one line of JSON, got {got!r}: does it print to stdout?")
+    if not isinstance(message, Mapping):
+        raise ValueError(f"expected its answer, a JSON object, got {text[:60].decode(errors='replace')!r}")
+    if "error" in message:
+        reason = _error(message)
+        if reason is None:
+            raise ValueError(f'refused, but not why: expected {{"error": "why"}}, got {text[:60].decode(errors="replace")!r}')
+        if message.get("unavailable") is True:
+            raise EngineUnavailable("", reason)
+        raise ValueError(reason)
     try:
-        message: Any = json.loads(text)
-    except ValueError:
-        raise ValueError(
-            f"expected its answer, one line of JSON, got {text[:60].decode(errors='replace')!r}: does it print to stdout?"
-        ) from None
-    if isinstance(message, Mapping) and "error" in message:
-        refusal = Refusal.model_validate(message)
-        if refusal.unavailable:
-            raise EngineUnavailable("", refusal.error)
-        raise ValueError(refusal.error)
-    try:
+        json.dumps(message, ensure_ascii=False).encode()
         return Answer.model_validate(message)
+    except UnicodeEncodeError:
+        raise ValueError("its answer to the greeting holds half of a surrogate pair: expected UTF-8") from None
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])

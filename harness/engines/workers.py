@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from types import TracebackType
@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 from harness.engines import protocol, requirements
 from harness.engines.base import Engine
 from harness.engines.child import Child, ChildError
-from harness.engines.environments import where
+from harness.engines.environments import own_environment, where
 from harness.engines.memory import MemoryWatch
 from harness.engines.process import Limits, ProcessEngine
 from harness.errors import EngineFailed
@@ -52,16 +52,20 @@ class Workers:
     def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None) -> None:
         """End every worker. Tasks still running see theirs end, and fail."""
         self._closing.set()
-        self._pool.shutdown(wait=False, cancel_futures=True)
-        with self._lock:
+        try:
+            # The warden kills the whole group: nothing that comes between, a second Ctrl-C say, can leave a worker behind.
+            if self._warden is not None and self._warden.stdin is not None:
+                self._warden.stdin.close()
+        finally:
+            self._pool.shutdown(wait=False, cancel_futures=True)
+            with self._lock:
+                for child in self._children:
+                    child.kill()
+            self._pool.shutdown(wait=True)
             for child in self._children:
-                child.kill()
-        self._pool.shutdown(wait=True)
-        for child in self._children:
-            child.close()
-        if self._warden is not None and self._warden.stdin is not None:
-            self._warden.stdin.close()
-            self._warden.wait()
+                child.close()
+            if self._warden is not None:
+                self._warden.wait()
 
     def submit(self, work: Callable[[], Result]) -> Future[Result]:
         """Run `work` when a core is free."""
@@ -79,26 +83,37 @@ class Workers:
         packages = [f"{name}={_location(name)}" for name in dict.fromkeys(["harness", adapter.__module__.split(".")[0]])]
         script = str(Path(__file__).with_name("worker.py"))
         command = [python, script, f"{adapter.__module__}:{adapter.__qualname__}", *packages]
-        greeting = protocol.greeting(description, tuple(frames))
-        with self._lock:
-            idle = self._idle.get(tuple(command), [])
-            child = idle.pop() if idle else None
-        if child is not None:
-            with contextlib.suppress(EngineFailed):  # what it served before may have spoilt it: a new one then
-                return ProcessEngine(adapter.source, child, protocol.AGAIN + greeting, self.limits, adapter)
-        return self.start(adapter.source, command, greeting, adapter=adapter)
+        engine = self.start(adapter.source, command, protocol.greeting(description, tuple(frames)), None, adapter)
+        if why := requirements.unmet(adapter, engine.installed()) if adapter.requirements else "":
+            raise EngineFailed(adapter.source, f"{why}: its environment has changed; {requirements.install_line(adapter)}")
+        return engine
 
-    def release(self, engine: Engine) -> None:
-        """Take back an engine that is needed no more; its worker may serve another description."""
-        if isinstance(engine, ProcessEngine) and engine.idle:
-            with self._lock:
-                self._idle.setdefault(tuple(engine.child.command), []).append(engine.child)
+    def settle(self, engines: Iterable[Engine]) -> None:
+        """Take back engines that are needed no more, at the end of a robot: of all workers, theirs alone may serve again."""
+        with self._lock:
+            for engine in engines:
+                if isinstance(engine, ProcessEngine) and engine.idle:
+                    self._idle.setdefault(_key(engine.child.command, engine.child.cwd), []).append(engine.child)
+            kept = [child for idle in self._idle.values() for child in idle]
+            for child in self._children:
+                if child not in kept:
+                    child.close()
+            self._children = kept
 
     def start(
         self, source: str, command: Sequence[str], greeting: bytes, cwd: Path | None = None, adapter: type[Engine] | None = None
     ) -> ProcessEngine:
-        """Start a worker command and greet it. Raises EngineFailed or EngineUnavailable."""
-        env = {**dict.fromkeys(ONE_THREAD, "1"), **os.environ}
+        """A worker that runs this command, greeted: one that has served before, or a new one.
+
+        Raises EngineFailed or EngineUnavailable.
+        """
+        with self._lock:
+            idle = self._idle.get(_key(command, cwd), [])
+            served = idle.pop() if idle else None
+        if served is not None:
+            with contextlib.suppress(EngineFailed):  # what it served before may have spoilt it: a new one then
+                return ProcessEngine(source, served, protocol.AGAIN + greeting, self.limits, adapter)
+        env = {**dict.fromkeys(ONE_THREAD, "1"), **(own_environment(command[0]) if adapter else os.environ)}
         try:
             with self._lock:
                 if self._closing.is_set():
@@ -123,9 +138,18 @@ class Workers:
         watch = MemoryWatch()
         while not self._closing.wait(WATCH):
             for child in list(self._children):
-                if (used := watch.used(child.process.pid)) > self.limits.memory:
-                    child.over = f"used {used / 2**30:.1f} GiB of memory, {self.limits.memory / 2**30:.1f} GiB are allowed"
+                if child.process.poll() is None and (used := watch.used(child.process.pid)) > self.limits.memory:
+                    child.over = f"used {_size(used)} of memory, {_size(self.limits.memory)} are allowed"
                     child.kill()
+
+
+def _key(command: Sequence[str], cwd: Path | None) -> tuple[str, ...]:
+    """What makes two workers the same."""
+    return (*command, str(cwd))
+
+
+def _size(count: float) -> str:
+    return f"{count / 2**30:.1f} GiB" if count >= 2**30 else f"{count / 2**20:.0f} MiB"
 
 
 def _location(package: str) -> str:

@@ -8,8 +8,9 @@ from collections.abc import Iterable
 
 from harness.report.document import Source
 
-# C0 and C1 controls, line separators and bidirectional overrides: they change more than their own letters.
-_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
+# C0 and C1 controls, line separators and bidirectional overrides change more than their own letters; surrogates and
+# non-characters cannot be written to XML.
+_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
 
 
 def plain(text: str) -> str:
