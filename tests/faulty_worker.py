@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from typing import cast
+from typing import BinaryIO, cast
 
 import numpy as np
 
@@ -22,7 +22,11 @@ from harness.engines.urdf_pinocchio import UrdfPinocchio
 from harness.se3 import Array
 
 FAULT = sys.argv[1] if len(sys.argv) > 1 else "none"
-LINKS = ("base", "wrist_3_link", "tool0")
+FRAMES = {
+    "misspells a frame": ("base", "0", "1", "thre", "6"),
+    "has the flange only": ("6",),
+    "has a few links": ("base", "wrist_3_link", "tool0"),
+}
 BLOCKS_BEFORE = 2  # answered well before a fault in a block
 
 
@@ -118,7 +122,7 @@ def killed_by_a_nameless_signal(count: int) -> None:
     os.kill(os.getpid(), 35)
 
 
-IN_A_BLOCK: dict[str, Callable[[int], None]] = {
+IN_A_BLOCK: dict[str, Callable[[int], object]] = {
     "exits in a block": exits,
     "segfaults": segfaults,
     "killed by a nameless signal": killed_by_a_nameless_signal,
@@ -130,6 +134,12 @@ IN_A_BLOCK: dict[str, Callable[[int], None]] = {
     "allocates in a child": allocates_in_a_child,
     "floods stderr": floods_stderr,
     "reports a failure": reports_a_failure,
+}
+
+
+AT_THE_END: dict[str, Callable[[], object]] = {
+    "talks at the end": lambda: floods_stderr(0),
+    "does not end": lambda: time.sleep(1000),
 }
 
 
@@ -149,48 +159,46 @@ def bent(T: Array, previous: Array | None) -> Array:
     return T
 
 
+def read_q(source: BinaryIO, count: int, width: int) -> Array:
+    if FAULT == "answers before it has read":
+        write(struct.pack("<d", count))
+    q: Array = np.frombuffer(source.read(8 * count * width), "<f8").reshape(count, width)
+    if FAULT == "dies beyond the limits" and np.abs(q).max() > 6.5:
+        sys.exit(9)
+    return np.clip(q, -3.0, 3.0) if FAULT == "clamps" else q
+
+
+def write_answer(count: int, answer: Array) -> None:
+    seconds = {"negative seconds": -5.0, "endless seconds": float("inf")}.get(FAULT, 0.0)
+    if FAULT in ("big-endian", "float32"):
+        kind = ">f8" if FAULT == "big-endian" else "<f4"
+        write(np.array([count, 0.0, *answer.ravel()], kind).tobytes())
+        return
+    head = struct.pack("<2d", count, seconds)[8 * (FAULT == "answers before it has read") :]
+    write(head + np.ascontiguousarray(answer).tobytes())
+
+
 def main() -> None:
     source = sys.stdin.buffer
     greeting = json.loads(source.readline())
-    if FAULT in AT_THE_START:
-        AT_THE_START[FAULT]()
+    AT_THE_START.get(FAULT, bool)()
     description = decode(greeting["description"])
     engine = DHNumpy(description) if isinstance(description, DHTable) else UrdfPinocchio(cast(UrdfText, description))
-    frames = {"misspells a frame": ("base", "0", "1", "thre", "6"), "has the flange only": ("6",), "has a few links": LINKS}.get(
-        FAULT, engine.frames
-    )
+    frames = FRAMES.get(FAULT, engine.frames)
     say({"protocol": "fk-crosscheck", "version": 1, "joints": engine.joints, "frames": frames})
-    seconds = {"negative seconds": -5.0, "endless seconds": float("inf")}.get(FAULT, 0.0)
     previous, blocks = None, 0
     while head := source.read(8):
         count = int(struct.unpack("<d", head)[0])
-        if FAULT == "answers before it has read":
-            write(struct.pack("<d", count))
-        q = np.frombuffer(source.read(8 * count * len(engine.joints)), "<f8").reshape(count, -1)
-        if FAULT == "dies beyond the limits" and np.abs(q).max() > 6.5:
-            sys.exit(9)
-        if FAULT == "clamps":
-            q = np.clip(q, -3.0, 3.0)
+        q = read_q(source, count, len(engine.joints))
         blocks += 1
         if blocks > BLOCKS_BEFORE:
-            if FAULT in IN_A_BLOCK:
-                IN_A_BLOCK[FAULT](count)
+            IN_A_BLOCK.get(FAULT, bool)(count)
             if FAULT == "reports a failure":
                 continue
-        T = engine.placements(q, ["6"] * len(frames) if FAULT == "misspells a frame" else frames)
-        answer = bent(T.copy(), previous) if blocks > BLOCKS_BEFORE else T
+        T = engine.placements(q, ["6" if frame == "thre" else frame for frame in frames])
+        write_answer(count, bent(T.copy(), previous) if blocks > BLOCKS_BEFORE else T)
         previous = T
-        if FAULT == "big-endian":
-            write(np.array([count, 0.0, *answer.ravel()], ">f8").tobytes())
-        elif FAULT == "float32":
-            write(np.array([count, 0.0, *answer.ravel()], "<f4").tobytes())
-        else:
-            head = struct.pack("<2d", count, seconds)[8 * (FAULT == "answers before it has read") :]
-            write(head + np.ascontiguousarray(answer).tobytes())
-    if FAULT == "talks at the end":
-        floods_stderr(0)
-    if FAULT == "does not end":
-        time.sleep(1000)
+    AT_THE_END.get(FAULT, bool)()
 
 
 if __name__ == "__main__":
