@@ -43,7 +43,7 @@ def _asides(sources: list[doc.Source], settings: doc.Settings) -> str:
             text += f"; {status}: {', '.join(names)}"
     for source in sources:
         if source.required and source.status == "ran" and "without" in source.mapping:
-            text += f"; {source.name} was compared {source.mapping}"
+            text += f"; {source.name} was compared {source.mapping[source.mapping.index('without') :]}"
     return f"{text}; not chosen: {', '.join(settings.not_chosen)}" if settings.not_chosen else text
 
 

@@ -298,6 +298,17 @@ def test_packaged_robots(build: Build) -> None:
         build(source, Packaged("UR5", tuple("abcde")))
 
 
+@pytest.mark.skipif(not ALL, reason="needs ikpy: CROSSCHECK_TESTS_ENGINES=all")
+def test_the_mapping_says_where_a_single_chain_ends(models: dict[str, RobotModel]) -> None:
+    """Left to itself ikpy ends a UR5 at ee_link, and a UR5e at base, where no joint moves it."""
+    for robot, last in (("ur5", "ee_link"), ("ur5e", "tool0")):
+        report = crosscheck(models[robot], Options(50, 0, ("urdf:ikpy",)))
+        (source,) = (s for s in report.sources if s.name == "urdf:ikpy")
+        assert source.verdict == "agrees"
+        assert last in {f.frame for f in source.frames}
+        assert source.mapping.startswith("placements read in base_link; without base")
+
+
 @pytest.mark.skipif(not ALL, reason="needs every engine: CROSSCHECK_TESTS_ENGINES=all")
 def test_an_oblique_axis_is_wrong_in_one_library_alone(tmp_path: Path) -> None:
     """Its trait says so, and the report names it; every other engine there is agrees with the derived table."""

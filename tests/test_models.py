@@ -213,6 +213,7 @@ def test_the_reference_may_not_be_without_a_frame(copy_model: Callable[..., Path
             "expected a frame at a declared offset from DH frame base or 0, 'tool0' is not; choose among: base, base_link",
         ),
         ('base = "base_link"\nwithout = ["base_link"]', "'base_link' is the base and left out at once"),
+        ('tip = "tol0"', "tip: no mapped frame 'tol0'; did you mean 'tool0'"),
         ('without = ["tol0"]', "no mapped frame 'tol0'; did you mean 'tool0'"),
         ('without = ["tool0", "wrist_3_link", "ee_link"]', "without: no mapped frame moves with joint 'wrist_3_joint'"),
         ('frames = { tool = "flange" }', "no mapped frame 'tool'; did you mean 'tool0'"),

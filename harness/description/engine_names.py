@@ -22,13 +22,20 @@ def check_engine_names(
     joints = set(joints)
     for source, entry in entries.items():
         key = f'engine."{source}"'
-        for part, names in (("base", [entry.base] if entry.base else []), ("frames", entry.frames), ("without", entry.without)):
+        for part, names in (
+            ("base", [entry.base] if entry.base else []),
+            ("tip", [entry.tip] if entry.tip else []),
+            ("frames", entry.frames),
+            ("without", entry.without),
+        ):
             for name in names:
                 if name not in known:
                     raise MappingError(f"no mapped frame {name!r}; {nearest(name, known)}", where=path, key=f"{key}.{part}")
         for name in entry.joints:
             if name not in joints:
                 raise MappingError(f"no joint {name!r}; {nearest(name, joints)}", where=path, key=f"{key}.joints")
+        if entry.tip is not None and known[entry.tip].urdf is None:
+            raise MappingError(f"{entry.tip!r} has no link in the URDF", where=path, key=f"{key}.tip")
         if entry.base is not None:
             _constant(known[entry.base], frames, table, path, f"{key}.base")
             if entry.base in entry.without:

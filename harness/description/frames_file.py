@@ -56,13 +56,15 @@ class EngineNames(Strict):
     """Names of one engine. All are optional.
 
     base: the mapped frame in which its placements are read, if it lacks the base frame; frames: its name for a mapped frame;
-    joints: its name for a joint; without: mapped frames it does not have; robot: its own name for a packaged model.
+    joints: its name for a joint; without: mapped frames it does not have; tip: the mapped frame that a library which builds one
+    chain only is to end it at; robot: its own name for a packaged model.
     """
 
     base: str | None = None
     frames: dict[str, str] = {}
     joints: dict[str, str] = {}
     without: list[str] = []
+    tip: str | None = None
     robot: str | None = Field(default=None, min_length=1)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -49,9 +49,11 @@ class Link:
 
 @dataclass(frozen=True)
 class UrdfText:
-    """All that an engine is given: the XML, stripped to links and joints."""
+    """All that an engine is given: the XML, stripped to links and joints; and the link that a library which builds one chain
+    only is to end it at, if the mapping names one."""
 
     text: str
+    tip: str = field(default="", kw_only=True)
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,7 @@ def encode(description: Description) -> dict[str, Any]:
         }
     if isinstance(description, Packaged):
         return {"kind": "packaged", "robot": description.robot, "joints": list(description.joints)}
-    return {"kind": "urdf", "text": description.text}
+    return {"kind": "urdf", "text": description.text, "tip": description.tip}
 
 
 def decode(message: dict[str, Any]) -> Description:
@@ -63,5 +63,5 @@ def decode(message: dict[str, Any]) -> Description:
     if kind == "packaged":
         return Packaged(message["robot"], tuple(message["joints"]))
     if kind == "urdf":
-        return UrdfText(message["text"])
+        return UrdfText(message["text"], tip=message["tip"])
     raise ValueError(f"expected a description of kind dh, urdf or packaged, got {kind!r}")

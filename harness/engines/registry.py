@@ -8,6 +8,7 @@ from importlib import metadata
 
 from harness.description.model import RobotModel
 from harness.description.packaged import Packaged
+from harness.description.urdf import UrdfText
 from harness.engines import requirements
 from harness.engines.base import Engine
 from harness.engines.protocol import Description
@@ -76,7 +77,11 @@ def description_of(source: str, model: RobotModel, takes: str = "") -> Descripti
         return model.table
     if model.urdf is None:
         raise DescriptionUnavailable(f"{source}: {model.name} has no URDF")
-    return model.urdf
+    names = model.engine_names.get(source)
+    if names is None or names.tip is None:
+        return model.urdf
+    link = next(frame.urdf for frame in model.frames.frames if frame.name == names.tip)
+    return UrdfText(model.urdf.text, tip=link or "")
 
 
 def load_engine(source: str, model: RobotModel) -> Engine:

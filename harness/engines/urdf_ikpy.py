@@ -16,7 +16,8 @@ from harness.se3 import Array
 
 
 class UrdfIkpy(Engine):
-    """`Chain.from_urdf_file` from the root link, otherwise with its defaults; `forward_kinematics(full_kinematics=True)`.
+    """`Chain.from_urdf_file` from the root link, or along the way to the tip if the mapping names one, which is what its
+    users pass as `base_elements`; otherwise with its defaults; `forward_kinematics(full_kinematics=True)`.
 
     ikpy calls its links after the URDF's joints: frames are the child links of these, after the root.
     """
@@ -63,9 +64,10 @@ class UrdfIkpy(Engine):
             links = [link.get("name", "") for link in robot.iterfind("link")]
             child_of = {joint.get("name"): _child(joint) for joint in robot.iterfind("joint")}
             root = next(link for link in links if link not in child_of.values())
+            way = _way(robot, description.tip) if description.tip else [root]
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # one warning for each fixed joint
-                self._chain = chain_module.Chain.from_urdf_file(io.StringIO(description.text), base_elements=[root])
+                self._chain = chain_module.Chain.from_urdf_file(io.StringIO(description.text), base_elements=way)
         except Exception as error:  # the parser raises whatever its own code happens to hit
             raise EngineFailed(self.source, f"from_urdf_file refused the URDF: {type(error).__name__}: {error}") from error
         # Its link 0 is the origin: the root link itself.
@@ -88,6 +90,17 @@ class UrdfIkpy(Engine):
             for slot, i in enumerate(slots):
                 out[k, slot] = poses[i]
         return out
+
+
+def _way(robot: ElementTree.Element, tip: str) -> list[str]:
+    """Links and joints in turn, from the root to `tip`."""
+    above = {_child(joint): joint for joint in robot.iterfind("joint")}
+    way = [tip]
+    while way[0] in above:
+        joint = above[way[0]]
+        parent = joint.find("parent")
+        way[:0] = ["" if parent is None else parent.get("link", ""), joint.get("name", "")]
+    return way
 
 
 def _child(joint: ElementTree.Element) -> str:
