@@ -30,7 +30,7 @@ from harness.report.json_file import read_report
 from tests.helpers import assert_placements_close
 
 WORKER = str(Path(__file__).parent / "faulty_worker.py")
-LIMITS = Limits(start=5.0, block=5.0, memory=400 << 20)
+LIMITS = Limits(start=10.0, block=8.0, memory=400 << 20)
 SAMPLES = 9000  # three blocks
 
 
@@ -77,8 +77,8 @@ def _nothing_left() -> Iterator[None]:
         ("leaves a daemon", "failed", 3, "exited with code 7"),
         ("killed by a nameless signal", "failed", 3, "killed by signal 35"),
         ("exits at once", "failed", 3, "at the start: exited with code 7; stderr ends: no licence found"),
-        ("sleeps at the start", "failed", 3, "at the start: did not answer within 5 s"),
-        ("sleeps at the start with a child", "failed", 3, "at the start: did not answer within 5 s"),
+        ("sleeps at the start", "failed", 3, "at the start: did not answer within 10 s"),
+        ("sleeps at the start with a child", "failed", 3, "at the start: did not answer within 10 s"),
         ("prints rubbish", "failed", 3, "got 'Loading controller firmware v3 ...': does it print to stdout?"),
         ("refuses", "failed", 3, "this controller is for another robot"),
         ("another version", "failed", 3, "version: expected 1, the version this harness speaks, got 2"),
@@ -86,15 +86,15 @@ def _nothing_left() -> Iterator[None]:
         ("exits in a block", "failed", 3, "exited with code 3 after 108 of"),
         ("segfaults", "failed", 3, "killed by SIGSEGV (Segmentation fault); stderr ends: about to read address 0"),
         ("aborts", "failed", 3, "killed by SIGABRT (Aborted)"),
-        ("sleeps in a block", "failed", 3, "did not answer within 5 s"),
+        ("sleeps in a block", "failed", 3, "did not answer within 8 s"),
         ("prints in a block", "failed", 3, "expected the count 823, got 'warning:': does it print to stdout?"),
         ("closes stdout", "failed", 3, "closed its stdout and went on running"),
-        ("allocates without end", "failed", 3, "MiB of memory, 400 MiB are allowed"),
-        ("allocates in a child", "failed", 3, "MiB of memory, 400 MiB are allowed"),
+        ("allocates without end", "failed", 3, "iB of memory, 400 MiB are allowed"),
+        ("allocates in a child", "failed", 3, "iB of memory, 400 MiB are allowed"),
         ("reports a failure", "failed", 3, "joint 3 outside its limits"),
         ("big-endian", "failed", 3, "write little-endian"),
         ("float32", "failed", 3, "expected the count 4096 as float64, got it as float32"),
-        ("too few frames", "failed", 3, "did not answer within 5 s after"),
+        ("too few frames", "failed", 3, "did not answer within 8 s after"),
         ("too many frames", "failed", 3, "bytes more than it was asked for"),
         ("nan", "invalid placements", 1, ""),
         ("not a rotation", "invalid placements", 1, ""),
@@ -167,7 +167,9 @@ def test_nothing_is_held_of_robots_that_are_done(models: dict[str, RobotModel]) 
             options = Options(5, 0, ("dh:pinocchio",), certify=False, workers=(("controller", (sys.executable, WORKER, fault)),))
             crosscheck(models["ur3"], options, None, workers)
             counts.append((open_files(), len([p for p in below() if WORKER in " ".join(p.cmdline())])))
-        assert counts == [(counts[0][0], 0)] * 5
+        assert not any(programs for _, programs in counts)
+        # The thread that watches the memory has a file of /proc open now and then; each leak would be four more.
+        assert max(files for files, _ in counts) <= counts[0][0] + 2
 
 
 def test_an_optional_one_that_fails_does_not_fail_the_gate_and_is_named(copy_model: Callable[..., Path]) -> None:
