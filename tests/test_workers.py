@@ -173,9 +173,10 @@ def test_nothing_is_held_of_robots_that_are_done(models: dict[str, RobotModel]) 
 
 
 def test_an_optional_one_that_fails_does_not_fail_the_gate_and_is_named(copy_model: Callable[..., Path]) -> None:
-    command = f'command = ["{sys.executable}", "{WORKER}", "exits at once"]'
-    text = f'[[source]]\nname = "controller"\nrequired = false\n{command}\n\n[[source]]\nname = "dh:pinocchio"\n'
-    folder = copy_model("ur3", ("model.toml", '[[source]]\nname = "dh:pinocchio"\n', text))
+    folder = copy_model("ur3")
+    sources = f'[[source]]\nname = "controller"\nrequired = false\ncommand = ["{sys.executable}", "{WORKER}", "exits at once"]\n'
+    text = (folder / "model.toml").read_text().split("[[source]]")[0]
+    (folder / "model.toml").write_text(f'{text}{sources}[[source]]\nname = "dh:pinocchio"\n')
     report = crosscheck(load_model(folder), Options(100, certify=False))
     assert report.verdict.exit_code == 0
     assert "failed: controller" in report.verdict.sentence
@@ -273,10 +274,11 @@ def descendants(pid: int) -> list[psutil.Process]:
 @pytest.mark.parametrize("fault", ["sleeps in a block", "sleeps at the start with a child"])
 def test_no_orphan_however_the_harness_ends(tmp_path: Path, number: signal.Signals, fault: str) -> None:
     worker = f"controller={sys.executable} {WORKER} '{fault}'"
-    command = [sys.executable, "-m", "harness", "run", "ur3", "--samples", "20000", "--worker", worker]
+    sources = ["--source", "dh:pinocchio", "--source", "urdf:pinocchio"]
+    command = [sys.executable, "-m", "harness", "run", "ur3", *sources, "--samples", "20000", "--worker", worker]
     harness = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True)
     try:
-        wanted = 7 if "child" in fault else 6  # four engines, the controller and the warden; and the controller's child
+        wanted = 5 if "child" in fault else 4  # two engines, the controller and the warden; and the controller's child
         wait_for(lambda: len(descendants(harness.pid)) >= wanted)
         time.sleep(1.0)
         started = descendants(harness.pid)
