@@ -6,6 +6,7 @@ The real ones are installed and run by `nox -s engines`.
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -180,6 +181,14 @@ def test_one_that_works_nowhere_is_said_and_kept_out(pip: Pip) -> None:
     assert reason(Friend) == "could not be installed: dies"
     pip.broken.clear()
     assert install.install([Friend], None, said.append)["dh:friend"].problem == ""
+
+
+def test_package_lists_that_cannot_be_had(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a network apt-get fails twice: that is the engine's problem, told in one line."""
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    monkeypatch.setattr(shutil, "which", lambda name: f"/usr/bin/{name}")
+    monkeypatch.setattr(install, "_run", lambda command, env=None: f"E: {command[1]} failed")
+    assert install.install([System], None, lambda text: None)["dh:system"].problem == "E: update failed"
 
 
 def test_debian_packages_need_root(monkeypatch: pytest.MonkeyPatch) -> None:

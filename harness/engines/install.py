@@ -94,8 +94,9 @@ def _system(adapter: type[Engine], say: Say) -> Installed:
             return Installed(problem=f"{problem}; as root: {' '.join(line)}")
         say(f"{adapter.source}: {' '.join(line)}")
         quiet = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
-        if _run(line, quiet) and (_run(["apt-get", "update"], quiet) or (failed := _run(line, quiet))):
-            return Installed(problem=failed or "apt-get update failed")
+        # The first attempt may fail for want of package lists.
+        if _run(line, quiet) and (failed := _run(["apt-get", "update"], quiet) or _run(line, quiet)):
+            return Installed(problem=failed)
         system_problem.cache_clear()
         if problem := system_problem(adapter.imports):
             return Installed(problem=problem)
