@@ -36,7 +36,8 @@ def assemble_source(results: Results, participant: Participant) -> doc.Source:
     )
     if bound is None:
         return part
-    part = part.model_copy(update={"joints": list(bound.engine.joints), **_joint_notes(results, bound)})
+    frames = {"read_in": bound.read_in, "absent": list(bound.absent)}
+    part = part.model_copy(update={"joints": list(bound.engine.joints), **frames, **_joint_notes(results, bound)})
     if results.comparison is None:
         why = "not compared: the reference did not run"
         return part.model_copy(update={"status": "not run", "reason": why})
@@ -169,12 +170,10 @@ def _traits(results: Results, source: str) -> list[doc.TraitNote]:
 
 def _joint_notes(results: Results, bound: Bound) -> dict[str, object]:
     """What the engine was given for mimic followers, and which joints were held at zero."""
-    mapping = [f"placements read in {bound.read_in}"] if bound.read_in else []
-    mapping += [f"without {', '.join(bound.absent)}"] if bound.absent else []
     held = [j for j in bound.joint_map.held if j in bound.engine.joints]
     followers = bound.joint_map.followers
     if not followers:
-        return {"held": held, "mapping": "; ".join(mapping)}
+        return {"held": held}
     passed = [j for j in followers if j in bound.engine.joints]
     applied = [j for j in followers if j not in bound.engine.joints]
     texts = []
@@ -182,7 +181,7 @@ def _joint_notes(results: Results, bound: Bound) -> dict[str, object]:
         texts.append(f"passed multiplier * q + offset for {', '.join(passed)}")
     if applied:
         texts.append(f"the engine itself moves {', '.join(applied)}")
-    return {"held": held, "mapping": "; ".join(mapping), "mimic": "; ".join(texts)}
+    return {"held": held, "mimic": "; ".join(texts)}
 
 
 def _evidence(results: Results, traits: list[doc.TraitNote], noise: NoiseClass) -> list[str]:

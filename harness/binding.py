@@ -27,9 +27,9 @@ class Bound:
     """An engine bound to a model: asked in the model's joint order, answering at the mapped frames.
 
     `frames` are the engine's frame names that are read; `view` tells how mapped frames follow from them; `missing` are
-    indices of mapped frames the engine does not have, though its description does (`missing_names`); `absent` those it need
-    not have, and `undeclared` those of them that frames.toml does not say so of; `read_in` the frame its placements are read
-    in, if not the base frame; `waited` is the time spent on its answers.
+    indices of mapped frames the engine does not have, though its description does; `absent` those it need not have, and
+    `undeclared` those of them that frames.toml does not say so of; `read_in` the frame its placements are read in, if not the
+    base frame; `waited` is the time spent on its answers.
     """
 
     engine: Engine
@@ -39,7 +39,6 @@ class Bound:
     missing: tuple[int, ...] = ()
     absent: tuple[str, ...] = ()
     undeclared: tuple[str, ...] = ()
-    missing_names: tuple[str, ...] = ()
     read_in: str = ""
     waited: float = 0.0
 
@@ -84,17 +83,17 @@ def bind(engine: Engine, model: RobotModel, offsets: Mapping[str, Array]) -> Bou
     joint_map = model.joint_map(kind).renamed(names.joints)
     _check_joints(engine, joint_map)
     frames = model.frames.frames
-    labels = [None if f.name in names.without else _label_there(f, kind, names, engine, model) for f in frames]
+    labels = {f.name: None if f.name in names.without else _label_there(f, kind, names, engine, model) for f in frames}
     if isinstance(engine, ProcessEngine) and engine.is_program:
         _check_frame_names(engine, kind, names, model)
-    read = [x for x in dict.fromkeys(labels) if x is not None and x in engine.frames]
-    slots = tuple(read.index(x) if x in read else -1 for x in labels)
-    missing = tuple(i for i, x in enumerate(labels) if x is not None and x not in read)
+    read = [x for x in dict.fromkeys(labels.values()) if x is not None and x in engine.frames]
+    slots = tuple(read.index(x) if x in read else -1 for x in labels.values())
+    missing = tuple(i for i, x in enumerate(labels.values()) if x is not None and x not in read)
     absent = [f.name for f in frames if f.name in names.without]
     undeclared = [frames[i].name for i in missing] if engine.partial else []
     if engine.partial:
         if joint := unchecked_joint((f for f, slot in zip(frames, slots, strict=True) if slot >= 0), model.table):
-            asked = ", ".join(dict.fromkeys(x for x in labels if x is not None))
+            asked = ", ".join(dict.fromkeys(x for x in labels.values() if x is not None))
             has = ", ".join(engine.frames)
             raise EngineFailed(
                 engine.source, f"has none of the frames that joint {joint!r} moves: asked for {asked}; it has {has}"
@@ -102,15 +101,14 @@ def bind(engine: Engine, model: RobotModel, offsets: Mapping[str, Array]) -> Bou
         absent += undeclared
         missing = ()
     constant = np.array([_constant(f, kind, names, offsets) for f in frames])
-    anchor = _anchor(engine, model, kind, names)
-    view = View(slots, constant, None)
+    anchor = _anchor(engine, model, kind, names, labels)
+    view, read_in = View(slots, constant, None), ""
     if anchor is not None:
         T = placement_in_base(anchor, model.frames.base, model.table)
-        base = read.index(str(_label_there(anchor, kind, names, engine, model)))
+        base = read.index(str(labels[anchor.name]))
         view = View(slots, constant, base, None if np.array_equal(T, np.eye(4)) else T)
-    read_in = "" if anchor in (None, model.frames.base) else anchor.name if anchor else ""
-    lost = tuple(frames[i].name for i in missing)
-    return Bound(engine, joint_map, tuple(read), view, missing, tuple(absent), tuple(undeclared), lost, read_in)
+        read_in = "" if anchor is model.frames.base else anchor.name
+    return Bound(engine, joint_map, tuple(read), view, missing, tuple(absent), tuple(undeclared), read_in)
 
 
 def _label(frame: MappedFrame, kind: str, names: EngineNames) -> str | None:
@@ -147,7 +145,9 @@ def _check_joints(engine: Engine, joint_map: JointMap) -> None:
         raise EngineFailed(engine.source, f"has no joint {lost[0]!r}; {nearest(lost[0], engine.joints)}")
 
 
-def _anchor(engine: Engine, model: RobotModel, kind: str, names: EngineNames) -> MappedFrame | None:
+def _anchor(
+    engine: Engine, model: RobotModel, kind: str, names: EngineNames, labels: Mapping[str, str | None]
+) -> MappedFrame | None:
     """The frame relative to which placements are read; None if they are in the base frame as they come.
 
     The one that frames.toml names; else, for a URDF, the base frame, or the first frame at a declared offset from it that
@@ -162,7 +162,7 @@ def _anchor(engine: Engine, model: RobotModel, kind: str, names: EngineNames) ->
         fit = [model.frames.base, *(f for f in frames if f.dh in ("base", "0") and f.offset is not None)]
         fit = [f for f in fit if f.name not in names.without]
     for frame in fit:
-        if _label_there(frame, kind, names, engine, model) in engine.frames:
+        if labels[frame.name] in engine.frames:
             return frame
     raise EngineFailed(engine.source, f"has none of the frames that stand still: {', '.join(f.name for f in fit)}")
 

@@ -83,18 +83,18 @@ def _bind_all(results: Results, workers: Workers) -> None:
     for participant in results.participants:
         if participant.bound is not None:
             participant.bound = bind(engines[participant.name], model, results.offsets)
-            _check_frames(participant, participant is results.participants[0])
+            _check_frames(participant, model, participant is results.participants[0])
     results.in_house = bind(DHNumpy(model.table), model, results.offsets)
 
 
-def _check_frames(participant: Participant, is_reference: bool) -> None:
+def _check_frames(participant: Participant, model: RobotModel, is_reference: bool) -> None:
     """Take out a source that leaves unchecked what it should show: a reference without a frame, a program that lost one.
 
     A program of model.toml must have every mapped frame, or frames.toml must say which it lacks; one given with --worker may
     have those it likes, and the verdict names the others.
     """
     bound = participant.running()
-    if is_reference and (lost := [*bound.absent, *bound.missing_names]):
+    if is_reference and (lost := [*bound.absent, *(model.frames.frames[i].name for i in bound.missing)]):
         participant.fail(EngineFailed(participant.name, f"cannot be the reference: it does not have {', '.join(lost)}"))
     elif participant.planned.folder is not None and participant.planned.command and bound.undeclared:
         key = f'frames.toml, [engine."{participant.name}"] without = {list(bound.undeclared)}'

@@ -91,9 +91,7 @@ def _chain_joints(urdf: Urdf, path: tuple[UrdfJoint, ...], base: str, tip: str) 
 
 def _placer(urdf: Urdf, joints: list[str], base: str, source: str) -> Callable[[Array, list[str]], Array]:
     """q (N, n) and link names to placements in the base link, (N, links, 4, 4); all other joints at zero."""
-    adapter = adapter_of(source)
-    requirements.check(adapter)
-    engine = adapter(urdf)
+    engine = requirements.build(adapter_of(source), urdf)
     if missing := [name for name in joints if name not in engine.joints]:
         raise EngineFailed(source, f"does not have joint {missing[0]!r}")
 

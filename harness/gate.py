@@ -42,8 +42,8 @@ def _asides(sources: list[doc.Source], settings: doc.Settings) -> str:
         if names := [s.name for s in sources if s.status == status and not s.required]:
             text += f"; {status}: {', '.join(names)}"
     for source in sources:
-        if source.required and source.status == "ran" and "without" in source.mapping:
-            text += f"; {source.name} was compared {source.mapping[source.mapping.index('without') :]}"
+        if source.required and source.status == "ran" and source.absent:
+            text += f"; {source.name} was compared without {', '.join(source.absent)}"
     return f"{text}; not chosen: {', '.join(settings.not_chosen)}" if settings.not_chosen else text
 
 

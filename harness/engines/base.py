@@ -48,7 +48,7 @@ class Engine(ABC):
     """
 
     source: str
-    takes: ClassVar[Literal["", "table", "urdf", "packaged"]] = ""
+    takes: ClassVar[Literal["", "packaged"]] = ""
     partial: bool = False
     isolated: ClassVar[bool] = True
     resolution: ClassVar[float] = 0.0

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import product
 from typing import Any
 
-import numpy as np
-
 from harness.description.dh import DHTable
-from harness.engines.base import Engine, Trait
+from harness.engines.base import Trait
+from harness.engines.kdl_base import KdlEngine, cells, placements
 from harness.errors import EngineFailed
 from harness.se3 import Array
 
-CELLS = tuple(product(range(3), range(4)))
 
-
-class DHKdl(Engine):
+class DHKdl(KdlEngine):
     """One `PyKDL.Chain` with a `RotZ` or `TransZ` joint per moving row; base and tool are fixed segments.
 
     A segment is a joint, then a constant frame. Standard: `Frame.DH` follows the joint. Modified: the joint comes last, so
@@ -24,8 +20,6 @@ class DHKdl(Engine):
     """
 
     source = "dh:kdl"
-    debian = ("python3-pykdl", "python3-numpy")
-    imports = ("PyKDL", "numpy")
     traits = (
         Trait(
             "one-frame-a-call",
@@ -59,10 +53,6 @@ class DHKdl(Engine):
         self.joints = description.joints
         self.frames = tuple(self._segments)
 
-    def installed(self) -> dict[str, str]:
-        """Version of PyKDL, which is no distribution of pip's."""
-        return {"PyKDL": str(self._kdl.__version__)}
-
     def _placements(self, q: Array, frames: Sequence[str]) -> Array:
         solve, frame = self._solver.JntToCart, self._kdl.Frame()
         joints = self._kdl.JntArray(len(self.joints))
@@ -74,10 +64,8 @@ class DHKdl(Engine):
             for count in counts:
                 if solve(joints, frame, count) != 0:
                     raise EngineFailed(self.source, f"JntToCart: {self._solver.strError(self._solver.getError())}")
-                values.extend(map(frame.__getitem__, CELLS))
-        out = np.tile(np.eye(4), (q.shape[0], len(frames), 1, 1))
-        out[..., :3, :] = np.reshape(values, (*out.shape[:2], 3, 4))
-        return out
+                values.extend(cells(frame))
+        return placements(values, q.shape[0], len(frames))
 
 
 def _frame(kdl: Any, T: Array) -> Any:

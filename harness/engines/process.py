@@ -102,9 +102,7 @@ class ProcessEngine(Engine):
             self.child.kill()
             raise EngineFailed(self.source, f"at the start: {error}") from error
         try:
-            return read_answer(text)
-        except EngineUnavailable as error:
-            raise EngineUnavailable(self.source, error.reason) from None
+            return read_answer(self.source, text)
         except ValueError as error:
             self.child.kill()
             raise EngineFailed(self.source, f"{error}{self.child.last_words()}") from error
@@ -173,7 +171,7 @@ def _error(message: Any) -> str | None:
     return str(message["error"])[:LONGEST_TEXT].encode("utf-8", "replace").decode() or "it gave no reason"
 
 
-def read_answer(text: bytes) -> Answer:
+def read_answer(source: str, text: bytes) -> Answer:
     """Parse the answer line. Raises ValueError with what is wrong or the worker's own reason, or EngineUnavailable."""
     message = _parsed(text)
     if message is None:
@@ -186,7 +184,7 @@ def read_answer(text: bytes) -> Answer:
         if reason is None:
             raise ValueError(f'refused, but not why: expected {{"error": "why"}}, got {text[:60].decode(errors="replace")!r}')
         if message.get("unavailable") is True:
-            raise EngineUnavailable("", reason)
+            raise EngineUnavailable(source, reason)
         raise ValueError(reason)
     try:
         json.dumps(message, ensure_ascii=False).encode()

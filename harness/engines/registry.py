@@ -90,5 +90,4 @@ def load_engine(source: str, model: RobotModel) -> Engine:
     Raises InputError (unknown source), EngineUnavailable (not installed), EngineFailed (refuses the description).
     """
     adapter = adapter_of(source)
-    requirements.check(adapter)
-    return adapter(description_of(source, model, adapter.takes))
+    return requirements.build(adapter, description_of(source, model, adapter.takes))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping
+from typing import Any
 
 from packaging.requirements import Requirement
 
@@ -26,6 +27,12 @@ def unmet(adapter: type[Engine], found: Mapping[str, str]) -> str:
         if not need.specifier.contains(have, prereleases=True):
             return f"needs {text}, found {need.name} {have}"
     return ""
+
+
+def build(adapter: type[Engine], description: Any) -> Engine:
+    """The engine on a description, in this process. Raises EngineUnavailable (not here) or EngineFailed (refuses it)."""
+    check(adapter)
+    return adapter(description)
 
 
 def check(adapter: type[Engine]) -> None:

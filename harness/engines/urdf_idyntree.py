@@ -44,7 +44,7 @@ class UrdfIdyntree(Engine):
         try:
             loaded = loader.loadModelFromString(description.text, "urdf")
             model = loader.model()
-        except Exception as error:
+        except Exception as error:  # whatever its bindings hit
             raise EngineFailed(self.source, f"loadModelFromString refused the URDF: {type(error).__name__}: {error}") from error
         # It may say yes to a file it has refused: the model is empty then, and kinematics on it ends the process.
         if not loaded or model.getNrOfLinks() == 0:

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import product
 from typing import Any
 from xml.etree import ElementTree as ET
 
-import numpy as np
-
 from harness.description.urdf import UrdfText
-from harness.engines.base import Engine, Trait
+from harness.engines.base import Trait
+from harness.engines.kdl_base import KdlEngine, cells, placements
 from harness.errors import EngineFailed
 from harness.se3 import Array
 
-CELLS = tuple(product(range(3), range(4)))
 
-
-class UrdfKdl(Engine):
+class UrdfKdl(KdlEngine):
     """`PyKDL.Tree`, one chain and `ChainFkSolverPos_recursive` per leaf; the other links are segments on the way there.
 
     PyKDL reads no URDF, and neither Debian nor PyPI has kdl_parser_py. So its conversion is written out here: depth first,
@@ -26,8 +22,6 @@ class UrdfKdl(Engine):
     """
 
     source = "urdf:kdl"
-    debian = ("python3-pykdl", "python3-numpy")
-    imports = ("PyKDL", "numpy")
     traits = (
         Trait(
             "missing-axis-refused",
@@ -78,10 +72,6 @@ class UrdfKdl(Engine):
             columns = [self.joints.index(j) for segment in path if (j := segment.getJoint().getName()) in self.joints]
             self._chains.append((kdl.ChainFkSolverPos_recursive(chain), columns, kdl.JntArray(len(columns)), chain))
 
-    def installed(self) -> dict[str, str]:
-        """Version of PyKDL, which is no distribution of pip's."""
-        return {"PyKDL": str(self._kdl.__version__)}
-
     def _placements(self, q: Array, frames: Sequence[str]) -> Array:
         frame = self._kdl.Frame()
         used = [self._chains[i] for i in {self._ways[name][0] for name in frames}]
@@ -94,10 +84,8 @@ class UrdfKdl(Engine):
             for solver, joints, count in calls:
                 if solver.JntToCart(joints, frame, count) != 0:
                     raise EngineFailed(self.source, f"JntToCart: {solver.strError(solver.getError())}")
-                values.extend(map(frame.__getitem__, CELLS))
-        out = np.tile(np.eye(4), (q.shape[0], len(frames), 1, 1))
-        out[..., :3, :] = np.reshape(values, (*out.shape[:2], 3, 4))
-        return out
+                values.extend(cells(frame))
+        return placements(values, q.shape[0], len(frames))
 
 
 def _segments(kdl: Any, robot: ET.Element, root: str) -> Iterator[tuple[str, Any]]:

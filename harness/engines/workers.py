@@ -77,14 +77,13 @@ class Workers:
         Raises EngineUnavailable (not installed) or EngineFailed (refuses the description).
         """
         if self.in_process or not adapter.isolated:
-            requirements.check(adapter)
-            return adapter(description)
+            return requirements.build(adapter, description)
         python = python or where(adapter).python
         packages = [f"{name}={_location(name)}" for name in dict.fromkeys(["harness", adapter.__module__.split(".")[0]])]
         script = str(Path(__file__).with_name("worker.py"))
         command = [python, script, f"{adapter.__module__}:{adapter.__qualname__}", *packages]
         engine = self.start(adapter.source, command, protocol.greeting(description, tuple(frames)), None, adapter)
-        if why := requirements.unmet(adapter, engine.installed()) if adapter.requirements else "":
+        if why := requirements.unmet(adapter, engine.installed()):
             raise EngineFailed(adapter.source, f"{why}: its environment has changed; {requirements.install_line(adapter)}")
         return engine
 

@@ -135,7 +135,11 @@ class Certificate(Part):
 
 
 class Source(Part):
-    """One source: whether it ran, what it was given, and how it compares."""
+    """One source: whether it ran, what it was given, and how it compares.
+
+    read_in: the frame its placements were read in, if it lacks the base frame; absent: mapped frames it does not have, and
+    was not compared at.
+    """
 
     name: str
     required: bool
@@ -150,7 +154,8 @@ class Source(Part):
     joints: list[str] = []
     mimic: str = ""
     held: list[str] = []
-    mapping: str = ""
+    read_in: str = ""
+    absent: list[str] = []
     traits: list[TraitNote] = []
     validity: Validity | None = None
     frames: list[FrameResult] = []

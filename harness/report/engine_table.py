@@ -59,4 +59,4 @@ def _notes(entries: Sequence[tuple[Report, Source]]) -> str:
         if source.verdict not in GOOD:
             robots.setdefault(source.reason or f"{source.verdict} at {source.worst_frame}", []).append(report.robot.name)
     total = len(entries)
-    return "; ".join(f"{why}{'' if len(names) == total else f' ({chr(44).join(names)})'}" for why, names in robots.items())
+    return "; ".join(why if len(names) == total else f"{why} ({','.join(names)})" for why, names in robots.items())
