@@ -1,0 +1,88 @@
+"""What a repair changes, in words and numbers, and which of several equivalent wordings is the plainest."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from harness.analysis.mechanism import Parameter
+
+# a: the reference's description; b: the source's; between: the mapping; source: what the source does with its description.
+Side: TypeAlias = Literal["a", "b", "between", "source"]
+
+# The first is said first. Parameters are ranked by `_parameter_rank`.
+_PLAIN = (
+    "frame", "base frame", "mimic", "axis default", "axis length", "truncated pi", "float32", "tool left out", "convention",
+    "reversed", "inverse", "degrees", "millimetres", "sign", "order", "coupling", "axis",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Change:
+    """One change that a repair makes.
+
+    kind: `parameter`, or what the catalogue calls it; side: what is changed; subject: the joint or frame, or `base`, `tool`;
+    parameter: which number; size: by how much [m or rad] it is changed, before: its value on file; unit: of both, or none.
+    """
+
+    kind: str
+    side: Side
+    subject: str = ""
+    parameter: str = ""
+    size: float = 0.0
+    before: float = 0.0
+    unit: str = ""
+    text: str = ""
+
+    @property
+    def key(self) -> tuple[str, str, str, str, float]:
+        """What is changed, whatever the size of a number's change."""
+        return self.kind, self.side, self.subject, self.parameter, 0.0 if self.kind == "parameter" else self.size
+
+    @property
+    def rank(self) -> tuple[float, str, str]:
+        """Order of plainness: smaller is plainer."""
+        plain = _PLAIN.index(self.kind) if self.kind in _PLAIN else len(_PLAIN) + self._parameter_rank()
+        return plain, self.subject, self.parameter
+
+    def _parameter_rank(self) -> float:
+        """Quarter turns of base or tool, then numbers on file, those that were not zero first, then other bases and tools."""
+        if self.subject in ("base", "tool"):
+            quarters = self.size / (math.pi / 2)
+            return 0.0 if self.unit == "rad" and abs(quarters - round(quarters)) < 1e-6 else 4.0
+        likely = 1.0 if self.before != 0.0 else 2.0
+        return likely + (0.0 if self.side == "a" else 0.5)
+
+
+def of_parameter(side: Side, parameter: Parameter, size: float, before: float, label: str, wanted_by: str) -> Change:
+    """The change of one number of a description. label: the description's name; wanted_by: who would then agree."""
+    change = Change("parameter", side, parameter.owner, parameter.name, size, before, parameter.unit)
+    name = {"yaw": "turned", "pitch": "turned", "roll": "turned"}.get(parameter.name)
+    if parameter.owner in ("base", "tool"):
+        axis = {"yaw": "z", "pitch": "y", "roll": "x"}.get(parameter.name, parameter.name)
+        by = f"{amount(size, parameter.unit)} {'about' if name else 'along'} {axis}"
+        text = f"{parameter.owner}: {wanted_by} has it {name or 'moved'} by {by}"
+    else:
+        after = before + size
+        text = (
+            f"{parameter.name} of {parameter.owner}: {value(before, parameter.unit)} in {label}, "
+            f"{value(after, parameter.unit)} by {wanted_by} (differs by {amount(size, parameter.unit)})"
+        )
+    return Change(**{**change.__dict__, "text": text})
+
+
+def amount(x: float, unit: str) -> str:
+    """`+0.301 mm`, `-1 deg`; below a micrometre or a microradian in m and rad."""
+    if unit == "m":
+        return f"{x * 1e3:+.6g} mm" if abs(x) >= 1e-6 else f"{x:+.4g} m"
+    return f"{math.degrees(x):+.6g} deg" if abs(x) >= 1e-6 else f"{x:+.4g} rad"
+
+
+def value(x: float, unit: str) -> str:
+    """`0.089159 m`, `90 deg`."""
+    return f"{_clean(x):.9g} m" if unit == "m" else f"{_clean(math.degrees(x)):.9g} deg"
+
+
+def _clean(x: float) -> float:
+    return 0.0 if abs(x) < 1e-15 else x

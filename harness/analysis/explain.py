@@ -1,0 +1,200 @@
+"""Why two models disagree: the fewest changes that, made to one side, were tried and make both agree.
+
+First one change, of the catalogue or of one number; then two, then three, from the most promising starts; then as many numbers
+as it takes. Nothing is named that was not applied, compared again and found within tolerance. Other changes that do the same
+are named beside each: one mechanism has many wordings, and the files alone cannot tell which was meant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness import se3
+from harness.analysis import fit
+from harness.analysis.catalogue import fine, structural
+from harness.analysis.changes import Change
+from harness.analysis.frame_names import renamed
+from harness.analysis.problem import End, Knob, Problem, State
+from harness.analysis.refine import combined, polish
+
+BEAM = 8
+NARROW = 5
+GROSS = 1e-3  # of the reach: below it no wrong joint, unit or frame is looked for
+SAME_MECHANISM = 5.0
+MANY = 14
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A repair that works: its changes, and for each the others that do the same in its place; errors [m], [rad]."""
+
+    changes: tuple[Change, ...]
+    equivalents: tuple[tuple[Change, ...], ...]
+    before: tuple[float, float]
+    after: tuple[float, float]
+
+
+def explain(problem: Problem) -> Explanation | None:
+    """The plainest repair of the fewest changes; None if none was found, or nothing disagrees."""
+    start = State.start(problem)
+    if not all(np.isfinite(T).all() for T in start.now) or start.agrees():
+        return None
+    for find in (_one, _two, _three, _many):
+        if (found := find(start)) is not None:
+            return _told(start, found)
+    return None
+
+
+def _one(start: State) -> State | None:
+    return _best(_accepted(_singles(start)))
+
+
+def _two(start: State) -> State | None:
+    for state in combined(start, 2, NARROW):
+        if (found := _polished(state)) is not None:
+            return found
+    for state in _promising(start, BEAM):
+        if (found := _best(_accepted(_refined(_singles(state))))) is not None:
+            return found
+    return None
+
+
+def _three(start: State) -> State | None:
+    firsts = _promising(start, BEAM)
+    for state in firsts:
+        for pair in combined(state, 2, NARROW):
+            if (found := _polished(pair)) is not None:
+                return _fewer(found)
+    for state in combined(start, 3, NARROW):
+        if (found := _polished(state)) is not None:
+            return found
+    for state in firsts[:NARROW]:
+        for second in _promising(state, NARROW):
+            if (found := _best(_accepted(_refined(_singles(second))))) is not None:
+                return found
+    return None
+
+
+def _many(start: State) -> State | None:
+    """As many numbers as it takes, one after the other, each the one that leaves least; then those that are not needed out."""
+    for first in (start, *_promising(start, 2)):
+        state = first
+        while state.size < first.size + MANY:
+            ranked = sorted((s for s in _numbers(state) if s.size > state.size), key=lambda s: s.left)
+            better = [p for s in ranked[:3] if (p := polish(s)) is not None and p.left < state.left]
+            if not better:
+                break
+            state = min(better, key=lambda s: s.left)
+            if state.agrees():
+                return _fewer(state)
+    return None
+
+
+def _singles(state: State) -> Iterator[State]:
+    """Every state with one change more: numbers always, the catalogue if enough is left for it to matter."""
+    if state.left > GROSS * state.problem.reach:
+        yield from renamed(state)
+        yield from structural(state)
+    else:
+        yield from fine(state)
+        yield from renamed(state)
+    yield from _numbers(state)
+
+
+def _numbers(state: State) -> Iterator[State]:
+    """Every number of both sides, each at its best value."""
+    problem = state.problem
+    T_a, T_b = (T[:, problem.fitted] for T in state.now)
+    ends: tuple[tuple[End, np.ndarray], ...] = (("a", T_b), ("b", se3.inverse(T_a) if state.inverse else T_a))
+    for end, wanted in ends:
+        mechanism = state.mechanism(end)
+        if mechanism is None:
+            continue
+        for _, parameter, delta in fit.each_alone(mechanism, fit.Seen(problem.seen.q, problem.fitted_names, wanted)):
+            knob = Knob(end, parameter)
+            yield state.shifted({**state.shifts, knob: state.shifts.get(knob, 0.0) + delta})
+
+
+def _accepted(states: Iterable[State]) -> list[State]:
+    """Those that work."""
+    return [s for s in states if s.left <= 2.0 * max(s.problem.tolerance) and s.agrees()]
+
+
+def _best(states: Sequence[State]) -> State | None:
+    """The plainest of those that leave least: others within tolerance, but not as near, are other mechanisms."""
+    if not states:
+        return None
+    least = min(s.left for s in states)
+    alike = [s for s in states if s.left <= SAME_MECHANISM * least + 1e-15]
+    return min(alike, key=_plainness)
+
+
+def _plainness(state: State) -> tuple[int, list[tuple[float, str, str]]]:
+    return state.size, sorted(change.rank for change in state.changes())
+
+
+def _promising(state: State, count: int) -> list[State]:
+    """The states with one change more that leave least."""
+    return sorted(_singles(state), key=lambda s: s.left)[:count]
+
+
+def _refined(states: Iterable[State]) -> Iterator[State]:
+    """Each fitted again with all its numbers, if that may help."""
+    ranked = sorted(states, key=lambda s: s.left)[: 2 * BEAM]
+    for state in ranked:
+        better = polish(state) if len(state.shifts) > 1 else state
+        yield state if better is None else better
+
+
+def _polished(state: State) -> State | None:
+    better = polish(state)
+    return better if better is not None and better.agrees() else None
+
+
+def _fewer(state: State) -> State:
+    """Without the numbers that it agrees without."""
+    for knob in sorted(state.shifts, key=lambda k: abs(state.shifts[k])):
+        rest = state.shifted({k: x for k, x in state.shifts.items() if k != knob})
+        if rest.shifts and (found := _polished(rest)) is not None:
+            state = found
+    return state
+
+
+def _told(start: State, found: State) -> Explanation:
+    """With what could stand in the place of each change; the plainest wording first."""
+    slots: list[tuple[Change, ...]] = []
+    for own in found.changes():
+        said = {own.key: own}
+        rest = _without(start, found, own)
+        if rest is not None:
+            kept = {change.key for change in rest.changes()}
+            tried = _accepted(_refitted(rest))
+            least = max(min((s.left for s in tried), default=0.0), found.left)
+            alike = [s for s in tried if s.left <= SAME_MECHANISM * least + 1e-15]
+            said.update({c.key: c for s in alike for c in s.changes() if c.key not in kept and c.key != own.key})
+        slots.append(tuple(sorted(said.values(), key=lambda c: c.rank)))
+    slots.sort(key=lambda slot: slot[0].rank)
+    return Explanation(tuple(s[0] for s in slots), tuple(s[1:] for s in slots), start.errors(), found.errors())
+
+
+def _refitted(rest: State) -> Iterator[State]:
+    """Every state with one change more; numbers fitted before may have to give way."""
+    for state in _singles(rest):
+        better = polish(state) if rest.shifts and state.left < rest.left else state
+        yield state if better is None else better
+
+
+def _without(start: State, found: State, change: Change) -> State | None:
+    """The repair without one of its changes: the structural ones made again, one after the other."""
+    state = start
+    for edit in found.edits:
+        if edit.key != change.key:
+            again = next((s for s in (*renamed(state), *structural(state)) if s.edits[-1].key == edit.key), None)
+            if again is None:
+                return None
+            state = again
+    kept = {k: x for k, x in found.shifts.items() if (k.end, *k.parameter[:2]) != (change.side, change.subject, change.parameter)}
+    return state.shifted(kept if change.kind == "parameter" else found.shifts)

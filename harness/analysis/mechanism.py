@@ -1,0 +1,159 @@
+"""A mechanism as a tree of elementary factors, each with a named parameter: what a repair edits, and a fit differentiates.
+
+Every description becomes the same thing: turns about and moves along x, y and z, some by a constant, some by a joint. A DH row
+is four of them, a URDF joint seven. Changing the value v of one factor by delta moves all frames behind it by a rigid motion:
+    T_f(v + delta) = exp(delta xi) T_f(v),   xi = Ad(T_k) e_k   for the placement T_k of the factor
+since a factor commutes with itself. So the twist xi (6,), linear part first, is the exact derivative of every placement.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness import se3
+from harness.se3 import Array
+
+Mask: TypeAlias = NDArray[np.bool_]
+
+AXES = {"x": 0, "y": 1, "z": 2}
+
+
+class Parameter(NamedTuple):
+    """A number of a description: whose (a joint's name, `base` or `tool`), which (`d`, `origin x`, ...), and in m or rad."""
+
+    owner: str
+    name: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Factor:
+    """A turn (`turns`) about, or a move along, an axis by value + row . q; or a constant transform T (4, 4).
+
+    `sign` is -1 where the factor is the inverse of what the parameter describes: a URDF joint passed from child to parent.
+    """
+
+    parent: int
+    turns: bool = False
+    axis: str = "z"
+    value: float = 0.0
+    row: tuple[float, ...] | None = None
+    parameter: Parameter | None = None
+    sign: float = 1.0
+    T: Array | None = None
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """Factors in an order in which parents come first (parent -1: the base frame), and the factor behind which each frame is."""
+
+    joints: tuple[str, ...]
+    prismatic: tuple[bool, ...]
+    factors: tuple[Factor, ...]
+    frames: Mapping[str, int]
+
+    def placements(self, q: Array, names: Sequence[str] | None = None) -> Array:
+        """Placements of the named frames (all, if None) in the base frame, q (N, n) -> (N, F, 4, 4)."""
+        return self._read(self._all(q), names)
+
+    def _read(self, T: Array, names: Sequence[str] | None) -> Array:
+        at = [self.frames[name] + 1 for name in (self.frames if names is None else names)]
+        return np.moveaxis(T[at], 0, 1)
+
+    def _all(self, q: Array) -> Array:
+        """Placement behind every factor, the base first: (len(factors) + 1, N, 4, 4)."""
+        T = np.empty((len(self.factors) + 1, len(q), 4, 4))
+        T[0] = np.eye(4)
+        for k, factor in enumerate(self.factors, start=1):
+            T[k] = _step(T[factor.parent + 1], factor, q)
+        return T
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Every parameter, in the order of the factors."""
+        return tuple(dict.fromkeys(f.parameter for f in self.factors if f.parameter is not None))
+
+    def twists(self, q: Array, names: Sequence[str]) -> tuple[Array, Array, Mask]:
+        """Placements (N, F, 4, 4), the twist of every parameter (K, N, 6), and which frames it moves (K, F)."""
+        T = self._all(q)
+        xi = np.zeros((len(self.parameters), len(q), 6))
+        moves = np.zeros((len(self.parameters), len(names)), dtype=bool)
+        slot = {parameter: k for k, parameter in enumerate(self.parameters)}
+        ends = [self.frames[name] for name in names]
+        for index, factor in enumerate(self.factors):
+            if factor.parameter is None:
+                continue
+            k, before = slot[factor.parameter], T[factor.parent + 1]
+            axis = before[:, :3, AXES[factor.axis]] * factor.sign
+            if factor.turns:
+                xi[k, :, :3], xi[k, :, 3:] = np.cross(before[:, :3, 3], axis), axis
+            else:
+                xi[k, :, :3] = axis
+            moves[k] |= [index in self._above[end] for end in ends]
+        return self._read(T, names), xi, moves
+
+    @cached_property
+    def _above(self) -> tuple[frozenset[int], ...]:
+        """For each factor, itself and all before it on the way from the base; the base, index -1, has none."""
+        out: list[frozenset[int]] = []
+        for k, factor in enumerate(self.factors):
+            out.append((out[factor.parent] if factor.parent >= 0 else frozenset()) | {k})
+        return (*out, frozenset())
+
+    def value(self, parameter: Parameter) -> float:
+        """The parameter's value [m or rad]."""
+        factor = next(f for f in self.factors if f.parameter == parameter)
+        return factor.sign * factor.value
+
+    def edited(self, edit: Callable[[Factor], Factor]) -> Mechanism:
+        """The mechanism with every factor replaced."""
+        return replace(self, factors=tuple(edit(factor) for factor in self.factors))
+
+    def shifted(self, changes: Mapping[Parameter, float]) -> Mechanism:
+        """Parameters changed by so much [m or rad]."""
+
+        def edit(f: Factor) -> Factor:
+            delta = changes.get(f.parameter, 0.0) if f.parameter else 0.0
+            return replace(f, value=f.value + f.sign * delta) if delta else f
+
+        return self.edited(edit)
+
+    def driven(self, P: Array) -> Mechanism:
+        """The mechanism asked at P q instead of q; P (n, n)."""
+        return self.edited(lambda f: f if f.row is None else replace(f, row=tuple(np.dot(f.row, P))))
+
+    def ended(self, offsets: Mapping[str, Array]) -> Mechanism:
+        """The named frames with a constant transform (4, 4) behind them."""
+        factors, frames = list(self.factors), dict(self.frames)
+        for name, Y in offsets.items():
+            factors.append(Factor(frames[name], T=Y))
+            frames[name] = len(factors) - 1
+        return replace(self, factors=tuple(factors), frames=frames)
+
+
+def _step(before: Array, factor: Factor, q: Array) -> Array:
+    """before @ the factor, (N, 4, 4): only two columns or the origin change."""
+    if factor.T is not None:
+        return np.asarray(before @ factor.T)
+    after = before.copy()
+    k = AXES[factor.axis]
+    amount = np.full(len(q), factor.value) if factor.row is None else q @ np.array(factor.row) + factor.value
+    if not factor.turns:
+        after[:, :3, 3] += before[:, :3, k] * amount[:, None]
+        return after
+    i, j = (k + 1) % 3, (k + 2) % 3
+    if factor.row is None:
+        s, c = se3.sincos(factor.value)
+        after[:, :3, i] = before[:, :3, i] * c + before[:, :3, j] * s
+        after[:, :3, j] = before[:, :3, j] * c - before[:, :3, i] * s
+        return after
+    s_, c_ = np.sin(amount)[:, None], np.cos(amount)[:, None]
+    after[:, :3, i] = before[:, :3, i] * c_ + before[:, :3, j] * s_
+    after[:, :3, j] = before[:, :3, j] * c_ - before[:, :3, i] * s_
+    return after
