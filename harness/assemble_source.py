@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
+from harness.analysis.changes import Change
 from harness.analysis.compare import Comparison
 from harness.analysis.noise import NoiseClass, classify
 from harness.analysis.statistics import Stream
@@ -14,7 +16,7 @@ from harness.engines.base import Trait
 from harness.engines.registry import adapter_of
 from harness.errors import CrosscheckError
 from harness.report import document as doc
-from harness.results import Results
+from harness.results import Explained, Results
 from harness.sources import Participant, deviation_on_file, pair_tolerance
 
 
@@ -75,6 +77,7 @@ def _judged(results: Results, comparison: Comparison, participant: Participant, 
             "noise": noise.key,
             "noise_text": noise.text,
             "explained_by": _evidence(results, part.traits, noise),
+            "explanation": explanation(results.explained.get(participant.name)),
             "reproducer": _reproducer(results, participant.name),
             "certificate": certificate,
         }
@@ -229,6 +232,28 @@ def _certificate(results: Results, source: str) -> doc.Certificate | None:
 
 def _finite(x: float) -> float | None:
     return x if math.isfinite(x) else None
+
+
+def _change(change: Change) -> dict[str, Any]:
+    return {field: getattr(change, field) for field in doc.OneChange.model_fields}
+
+
+def explanation(explained: Explained | None) -> doc.Explanation | None:
+    """The report entry of an explanation."""
+    if explained is None or explained.explanation is None:
+        return None if explained is None else doc.Explanation(unexplained=explained.unexplained)
+    found = explained.explanation
+    changes = [
+        doc.Change(**_change(change), equivalents=[doc.OneChange(**_change(other)) for other in others])
+        for change, others in zip(found.changes, found.equivalents, strict=True)
+    ]
+    return doc.Explanation(
+        changes=changes,
+        before_position=found.before[0],
+        before_rotation=found.before[1],
+        after_position=found.after[0],
+        after_rotation=found.after[1],
+    )
 
 
 def _reproducer(results: Results, source: str) -> doc.Reproducer | None:

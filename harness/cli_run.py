@@ -91,6 +91,7 @@ models_option = click.option(
 )
 @click.option("--samples", type=int, default=2000, show_default=True, help="Random configurations, besides the fixed ones.")
 @click.option("--certify/--no-certify", default=True, show_default=True, help="Prove a bound for all configurations.")
+@click.option("--explain/--no-explain", default=True, show_default=True, help="Look for the cause of each disagreement.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random configurations.")
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("reports"), show_default=True, help="Folder for the reports."
@@ -111,6 +112,7 @@ def run(
     reference: str,
     samples: int,
     certify: bool,
+    explain: bool,
     seed: int,
     out: Path,
     jobs: int,
@@ -127,7 +129,7 @@ def run(
     these, the smallest.
     """
     limits = Limits(start_timeout, block_timeout, memory_limit * 2**30)
-    options = Options(samples, seed, sources, reference, "", certify, all_engines, workers, limits, jobs, in_process)
+    options = Options(samples, seed, sources, reference, "", certify, explain, all_engines, workers, limits, jobs, in_process)
     folders = _folders(robots, models or default_models_dir())
     prepare(out)
     codes: list[int] = []
@@ -177,7 +179,8 @@ def _command(folder: Path, models: Path | None, options: Options) -> str:
     if options.reference != REFERENCE:
         words += ["--reference", options.reference]
     words += ["--samples", str(options.samples), "--seed", str(options.seed)]
-    return shlex.join(words if options.certify else [*words, "--no-certify"])
+    words += [] if options.certify else ["--no-certify"]
+    return shlex.join(words if options.explain else [*words, "--no-explain"])
 
 
 @contextlib.contextmanager

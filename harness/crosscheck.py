@@ -19,6 +19,7 @@ from harness.engines.process import ProcessEngine
 from harness.engines.registry import adapter_of, description_of, kind_of
 from harness.engines.workers import Workers
 from harness.errors import EngineFailed
+from harness.explaining import explain_all
 from harness.options import Options
 from harness.report.document import Report
 from harness.results import Reproduced, Results
@@ -44,6 +45,8 @@ def crosscheck(model: RobotModel, options: Options, progress: Progress | None = 
         results.comparison = compare(results, workers, progress)
         if results.comparison is not None:
             results.reproduced = _reproduce(results, results.comparison)
+            if options.explain:
+                results.explained = explain_all(results)
             if options.certify:
                 results.certified = certify_all(results, workers)
         _died(results)
@@ -114,6 +117,7 @@ def _died(results: Results) -> None:
                 results.comparison.drop(participant.name)
             results.certified.pop(participant.name, None)
             results.reproduced.pop(participant.name, None)
+            results.explained.pop(participant.name, None)
 
 
 def _reproduce(results: Results, comparison: Comparison) -> dict[str, Reproduced]:

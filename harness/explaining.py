@@ -8,14 +8,18 @@ from dataclasses import replace
 import numpy as np
 
 from harness.analysis import fit
-from harness.analysis.descriptions import SPECIFIED, X_AXIS, Z_AXIS
-from harness.analysis.explain import Explanation, explain
+from harness.analysis.changes import Change
+from harness.analysis.descriptions import X_AXIS, Z_AXIS, Reading
+from harness.analysis.explain import explain
+from harness.analysis.first_difference import first_difference
 from harness.analysis.problem import FAITHFUL, Problem, Seen
 from harness.analysis.recipes import Recipe, TableRecipe, UrdfRecipe
 from harness.binding import Bound
 from harness.description.model import RobotModel
 from harness.engines.registry import kind_of
+from harness.results import Explained, Results
 from harness.se3 import Array
+from harness.sources import pair_tolerance
 
 FITTED, CHECKED = 16, 48
 
@@ -40,11 +44,14 @@ def problem_of(
     rigid = frozenset(f.name for f in frames if f.relation == "rigid") if kinds[0] != kinds[1] else frozenset()
     if kinds == ["dh", "dh"]:
         recipes[1] = None  # one table: what differs is what is done with it
-    labels = tuple("dh.csv" if kind == "dh" else "the URDF" for kind in kinds)
+    behind = {names[i]: source.view.offsets[k] for i, k in enumerate(known)}
+    labels = ["dh.csv" if kind == "dh" else "the URDF" for kind in kinds]
+    engines = (reference.engine.source, source.engine.source)
+    # Two descriptions that are read as they should be differ themselves; else it is the engine that does.
+    sources = [label if recipe else name for label, recipe, name in zip(labels, recipes, engines, strict=True)]
     return Problem(
-        recipes[0], recipes[1], names, rigid, *parts, tolerance,
-        (labels[0], labels[1]), (reference.engine.source, source.engine.source),
-    )  # fmt: skip
+        recipes[0], recipes[1], names, rigid, *parts, tolerance, behind, (labels[0], labels[1]), (sources[0], sources[1]), engines
+    )
 
 
 def configurations(model: RobotModel) -> Array:
@@ -71,25 +78,74 @@ def _recipes(model: RobotModel, kind: str, names: tuple[str, ...], offsets: Mapp
         for stretched in (False, True) if "unnormalised-axis" in codes else (False,):
             for mimic in (True, False) if model.urdf_joints.followers else (True,):
                 for float32 in (False, True):
-                    yield replace(
-                        plain, reading=replace(SPECIFIED, default_axis=axis, stretched=stretched, mimic=mimic, float32=float32)
-                    )
+                    yield replace(plain, reading=Reading(axis, stretched, mimic, float32))
 
 
 def _faithful(
     candidates: list[Recipe], q: Array, names: tuple[str, ...], T: Array, tolerance: tuple[float, float]
 ) -> Recipe | None:
-    """The recipe that gives what the source gave, nearer than a part of the tolerance; None if there is none."""
-    best, least = None, np.inf
+    """The first recipe that gives what the source gave, to a part of the tolerance; None if none does."""
     for recipe in candidates:
-        ratio = max(e / t for e, t in zip(fit.errors(recipe.mechanism.placements(q, names), T), tolerance, strict=True))
-        if ratio < 0.5 * least and ratio <= FAITHFUL:
-            best, least = recipe, ratio
-    return best
+        errors = fit.errors(recipe.mechanism.placements(q, names), T)
+        if all(error <= FAITHFUL * limit for error, limit in zip(errors, tolerance, strict=True)):
+            return recipe
+    return None
 
 
-def explained(
-    model: RobotModel, offsets: Mapping[str, Array], reference: Bound, source: Bound, tolerance: tuple[float, float]
-) -> Explanation | None:
-    """Why the source disagrees; None if nothing was found."""
-    return explain(problem_of(model, offsets, reference, source, tolerance))
+def explain_all(results: Results) -> dict[str, Explained]:
+    """Why each source that is outside tolerance is; those that show the same as one before share its explanation."""
+    reference, comparison = results.participants[0], results.comparison
+    if reference.bound is None or comparison is None:
+        return {}
+    found: dict[str, Explained] = {}
+    solved: list[tuple[Problem, Explained]] = []
+    every = range(len(results.model.frames.frames))
+    for participant in results.participants[1:]:
+        tolerance = pair_tolerance(participant.planned, reference.planned)
+        if participant.bound is None or comparison.worst(participant.name, tolerance, every) is None:
+            continue
+        try:
+            problem = problem_of(results.model, results.offsets, reference.bound, participant.bound, tolerance)
+        except Exception as error:  # an engine's failure is its result; the comparison stands without its cause
+            found[participant.name] = Explained(unexplained=f"{participant.name} failed: {type(error).__name__}: {error}")
+            continue
+        known = next((_of_another(e, p, problem) for p, e in solved if _same(p, problem)), None)
+        if known is None:
+            known = told(problem, results.model)
+            solved.append((problem, known))
+        found[participant.name] = known
+    return found
+
+
+def told(problem: Problem, model: RobotModel) -> Explained:
+    """The repair that explains the difference, or where the two part."""
+    explanation = explain(problem)
+    if explanation is not None:
+        return Explained(explanation)
+    prismatic = tuple(model.table.kind(j) == "prismatic" for j in model.table.joints)
+    return Explained(unexplained=first_difference(problem, model.table.joints, prismatic))
+
+
+def _same(one: Problem, other: Problem) -> bool:
+    """Whether two sources of one kind showed the same, to a tenth of the finer tolerance."""
+    if one.names != other.names or one.sources[1].split(":")[0] != other.sources[1].split(":")[0]:
+        return False
+    errors = fit.errors(one.seen.b, other.seen.b)
+    return all(
+        error <= 0.1 * min(ends) for error, ends in zip(errors, zip(one.tolerance, other.tolerance, strict=True), strict=True)
+    )
+
+
+def _of_another(known: Explained, one: Problem, other: Problem) -> Explained:
+    """The explanation of one source as that of another, which showed the same."""
+    old, new = one.engines[1], other.engines[1]
+
+    def named(change: Change) -> Change:
+        return replace(change, text=change.text.replace(old, new))
+
+    text = known.unexplained.replace(old, new)
+    if known.explanation is None:
+        return Explained(unexplained=text)
+    e = known.explanation
+    changes, others = tuple(map(named, e.changes)), tuple(tuple(map(named, slot)) for slot in e.equivalents)
+    return Explained(replace(e, changes=changes, equivalents=others), text)

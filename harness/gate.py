@@ -104,4 +104,6 @@ def describe(source: doc.Source) -> str:
         else worst.rotation.worst
     )
     first = f"; first frame that disagrees: {source.first_disagreeing_frame}" if failing[0].frame != worst.frame else ""
-    return f"{by} at {where.label if where else '?'}{first}"
+    cause = source.explanation.changes if source.explanation else []
+    because = f"; because {' and '.join(change.text for change in cause)}" if cause else ""
+    return f"{by} at {where.label if where else '?'}{first}{because}"

@@ -15,7 +15,8 @@ class Options:
     """What a cross-check is asked to do. `sources` empty: those of model.toml. `command` is shown as how to reproduce.
 
     workers: (name, command) of programs that speak the worker protocol. all_engines: also every engine that model.toml does
-    not list. jobs: workers that compute at a time, 0 for one a core. in_process: engines run here, not in workers.
+    not list. explain: look for the cause of each disagreement. jobs: workers that compute at a time, 0 for one a core.
+    in_process: engines run here, not in workers.
     """
 
     samples: int = 2000
@@ -24,6 +25,7 @@ class Options:
     reference: str = REFERENCE
     command: str = ""
     certify: bool = True
+    explain: bool = True
     all_engines: bool = False
     workers: tuple[tuple[str, tuple[str, ...]], ...] = ()
     limits: Limits = field(default_factory=Limits)

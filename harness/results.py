@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from harness.analysis.certify import Bounds
 from harness.analysis.compare import Comparison
+from harness.analysis.explain import Explanation
 from harness.binding import Bound
 from harness.description.model import RobotModel
 from harness.options import Options
@@ -46,6 +47,14 @@ class Certified:
     rotation_found: Array | None = None
 
 
+@dataclass(frozen=True)
+class Explained:
+    """Why a source disagrees: the repair that was found, or what is known of the difference without one."""
+
+    explanation: Explanation | None = None
+    unexplained: str = ""
+
+
 @dataclass
 class Results:
     """Everything a run found. `comparison` is None if the reference did not run; `in_house` is always there."""
@@ -59,5 +68,6 @@ class Results:
     comparison: Comparison | None = None
     reproduced: dict[str, Reproduced] = field(default_factory=dict)
     certified: dict[str, Certified] = field(default_factory=dict)
+    explained: dict[str, Explained] = field(default_factory=dict)
     seconds: float = 0.0
     loaded_in: float = 0.0

@@ -74,7 +74,10 @@ def _of_joints(state: State) -> Iterator[tuple[Change, Recipe]]:
             yield Change("coupling", "between", joints[i], joints[j], factor, text=text), _mixed(state.a, P)
     turns = ~np.array(slides, dtype=bool)
     if turns.any():
-        for factor, how in ((1.0 / DEGREES, "takes degrees: radians are given"), (DEGREES, "takes radians: degrees are given")):
+        for factor, how in (
+            (1.0 / DEGREES, "reads radians as degrees: its joint values are 57.3 times too small"),
+            (DEGREES, "reads degrees as radians: its joint values are 57.3 times too large"),
+        ):
             text = f"degrees: {source} {how}"
             yield Change("degrees", "source", "q", size=factor, text=text), _mixed(state.a, np.diag(np.where(turns, factor, 1.0)))
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 from harness.analysis.mechanism import Parameter
 
 # a: the reference's description; b: the source's; between: the mapping; source: what the source does with its description.
+Unit: TypeAlias = Literal["m", "rad", ""]
 Side: TypeAlias = Literal["a", "b", "between", "source"]
 
 # The first is said first. Parameters are ranked by `_parameter_rank`.
 _PLAIN = (
-    "frame", "base frame", "mimic", "axis default", "axis length", "truncated pi", "float32", "tool left out", "convention",
+    "base frame", "tool left out", "frame", "mimic", "axis default", "axis length", "truncated pi", "float32", "convention",
     "reversed", "inverse", "degrees", "millimetres", "sign", "order", "coupling", "axis",
 )  # fmt: skip
 
@@ -32,7 +33,7 @@ class Change:
     parameter: str = ""
     size: float = 0.0
     before: float = 0.0
-    unit: str = ""
+    unit: Unit = ""
     text: str = ""
 
     @property
@@ -64,12 +65,12 @@ def of_parameter(side: Side, parameter: Parameter, size: float, before: float, l
         by = f"{amount(size, parameter.unit)} {'about' if name else 'along'} {axis}"
         text = f"{parameter.owner}: {wanted_by} has it {name or 'moved'} by {by}"
     else:
-        after = before + size
+        change_by = amount(size, parameter.unit)
         text = (
             f"{parameter.name} of {parameter.owner}: {value(before, parameter.unit)} in {label}, "
-            f"{value(after, parameter.unit)} by {wanted_by} (differs by {amount(size, parameter.unit)})"
+            f"{value(before + size, parameter.unit)} in {wanted_by} ({change_by})"
         )
-    return Change(**{**change.__dict__, "text": text})
+    return replace(change, text=text)
 
 
 def amount(x: float, unit: str) -> str:
@@ -80,9 +81,7 @@ def amount(x: float, unit: str) -> str:
 
 
 def value(x: float, unit: str) -> str:
-    """`0.089159 m`, `90 deg`."""
-    return f"{_clean(x):.9g} m" if unit == "m" else f"{_clean(math.degrees(x)):.9g} deg"
-
-
-def _clean(x: float) -> float:
-    return 0.0 if abs(x) < 1e-15 else x
+    """`0.089159 m`, `90 deg`; what no model file says is not shown, a whole turn or a picometre."""
+    if unit == "m":
+        return f"{round(x, 12) + 0.0:.9g} m"
+    return f"{round(math.degrees(math.remainder(x, 2.0 * math.pi)), 9) + 0.0:.9g} deg"

@@ -12,15 +12,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness import se3
 from harness.analysis import fit
 from harness.analysis.catalogue import fine, structural
 from harness.analysis.changes import Change
 from harness.analysis.frame_names import renamed
 from harness.analysis.problem import End, Knob, Problem, State
 from harness.analysis.refine import combined, polish
+from harness.se3 import Array
 
 BEAM = 8
+FEW = 3
 NARROW = 5
 GROSS = 1e-3  # of the reach: below it no wrong joint, unit or frame is looked for
 SAME_MECHANISM = 5.0
@@ -42,7 +43,7 @@ def explain(problem: Problem) -> Explanation | None:
     start = State.start(problem)
     if not all(np.isfinite(T).all() for T in start.now) or start.agrees():
         return None
-    for find in (_one, _two, _three, _many):
+    for find in (_one, _two_at_once, _two_and_two, _two, _three, _many):
         if (found := find(start)) is not None:
             return _told(start, found)
     return None
@@ -52,10 +53,31 @@ def _one(start: State) -> State | None:
     return _best(_accepted(_singles(start)))
 
 
-def _two(start: State) -> State | None:
+def _two_at_once(start: State) -> State | None:
+    """Two numbers to first order; or one change, then another where the first has left least."""
     for state in combined(start, 2, NARROW):
         if (found := _polished(state)) is not None:
             return found
+    for state in _promising(start, FEW):
+        if (found := _best(_accepted(_singles(state)))) is not None:
+            return found
+    return None
+
+
+def _two_and_two(start: State) -> State | None:
+    """One change, then two numbers to first order; three numbers to first order. Cheap, so before the long searches."""
+    for state in _promising(start, BEAM):
+        for pair in combined(state, 2, NARROW):
+            if (found := _polished(pair)) is not None:
+                return _fewer(found)
+    for state in combined(start, 3, NARROW):
+        if (found := _polished(state)) is not None:
+            return found
+    return None
+
+
+def _two(start: State) -> State | None:
+    """One change, then another, all numbers fitted together."""
     for state in _promising(start, BEAM):
         if (found := _best(_accepted(_refined(_singles(state))))) is not None:
             return found
@@ -63,16 +85,8 @@ def _two(start: State) -> State | None:
 
 
 def _three(start: State) -> State | None:
-    firsts = _promising(start, BEAM)
-    for state in firsts:
-        for pair in combined(state, 2, NARROW):
-            if (found := _polished(pair)) is not None:
-                return _fewer(found)
-    for state in combined(start, 3, NARROW):
-        if (found := _polished(state)) is not None:
-            return found
-    for state in firsts[:NARROW]:
-        for second in _promising(state, NARROW):
+    for first in _promising(start, NARROW):
+        for second in _promising(first, NARROW):
             if (found := _best(_accepted(_refined(_singles(second))))) is not None:
                 return found
     return None
@@ -108,14 +122,15 @@ def _numbers(state: State) -> Iterator[State]:
     """Every number of both sides, each at its best value."""
     problem = state.problem
     T_a, T_b = (T[:, problem.fitted] for T in state.now)
-    ends: tuple[tuple[End, np.ndarray], ...] = (("a", T_b), ("b", se3.inverse(T_a) if state.inverse else T_a))
-    for end, wanted in ends:
+    ends: tuple[tuple[End, Array], ...] = (("a", T_b),) if state.inverse else (("a", T_b), ("b", T_a))
+    for end, T in ends:
         mechanism = state.mechanism(end)
         if mechanism is None:
             continue
-        for _, parameter, delta in fit.each_alone(mechanism, fit.Seen(problem.seen.q, problem.fitted_names, wanted)):
+        wanted = T - problem.added(end, problem.seen)[:, problem.fitted]
+        for left, parameter, delta in fit.each_alone(mechanism, fit.Seen(problem.seen.q, problem.fitted_names, wanted)):
             knob = Knob(end, parameter)
-            yield state.shifted({**state.shifts, knob: state.shifts.get(knob, 0.0) + delta})
+            yield state.shifted({**state.shifts, knob: state.shifts.get(knob, 0.0) + delta}, left)
 
 
 def _accepted(states: Iterable[State]) -> list[State]:
@@ -143,7 +158,7 @@ def _promising(state: State, count: int) -> list[State]:
 
 def _refined(states: Iterable[State]) -> Iterator[State]:
     """Each fitted again with all its numbers, if that may help."""
-    ranked = sorted(states, key=lambda s: s.left)[: 2 * BEAM]
+    ranked = sorted(states, key=lambda s: s.left)[:BEAM]
     for state in ranked:
         better = polish(state) if len(state.shifts) > 1 else state
         yield state if better is None else better

@@ -31,7 +31,7 @@ def renamed(state: State) -> Iterator[State]:
 
 
 def _read_as_specified(state: State, b: UrdfRecipe) -> Iterator[State]:
-    source, reading = state.problem.sources[1], b.reading
+    source, reading = state.problem.engines[1], b.reading
     if reading.default_axis != SPECIFIED.default_axis:
         bare = [j.name for j in b.urdf.joint_list if j.axis is None and j.name in b.joints.names]
         text = f"axis default: {source} takes the missing axis of {', '.join(bare)} for z; the specification says x"
@@ -99,8 +99,10 @@ def _other_links(state: State, b: UrdfRecipe, links: Mapping[str, Array]) -> Ite
             change = Change("frame", "between", name, link, text=text)
             yield state.edited(change, state.a, replace(b, frames={**b.frames, name: link}))
             if link in b.frames.values():
-                other = next(n for n, at in b.frames.items() if at == link)
-                change = replace(change, text=f"frames {name} and {other}: their links {here} and {link} are exchanged")
+                pair = sorted((name, next(n for n, at in b.frames.items() if at == link)))
+                both = f"{b.frames[pair[0]]} and {b.frames[pair[1]]}"
+                text = f"frames {pair[0]} and {pair[1]}: their links {both} are exchanged"
+                change = Change("frame", "between", pair[0], pair[1], text=text)
                 yield state.edited(change, state.a, replace(b, frames=_exchanged(b.frames, here, link)))
 
 

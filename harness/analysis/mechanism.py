@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ class Parameter(NamedTuple):
 
     owner: str
     name: str
-    unit: str
+    unit: Literal["m", "rad"]
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,9 @@ class Mechanism:
         T = np.empty((len(self.factors) + 1, len(q), 4, 4))
         T[0] = np.eye(4)
         for k, factor in enumerate(self.factors, start=1):
-            T[k] = _step(T[factor.parent + 1], factor, q)
+            before = T[factor.parent + 1]
+            idle = factor.T is None and factor.row is None and factor.value == 0.0
+            T[k] = before if idle else _step(before, factor, q)
         return T
 
     @cached_property

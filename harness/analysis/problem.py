@@ -40,8 +40,9 @@ class Seen:
 class Problem:
     """a is the reference, b the source; a recipe is None if that one does not compute what its description says.
 
-    names: the compared frames; rigid: those whose offset is measured, by name; tolerance [m], [rad]; labels: what the two
-    descriptions are called, and who the two are.
+    names: the compared frames; rigid: those whose offset is measured; tolerance [m], [rad]; behind: the constant transform
+    (4, 4) that was put behind what the source gave for a frame, where there is one; labels: what the two descriptions are
+    called; sources: what differs, in words; engines: who computed.
     """
 
     a: Recipe | None
@@ -51,8 +52,11 @@ class Problem:
     seen: Seen
     check: Seen
     tolerance: tuple[float, float]
+    behind: Mapping[str, Array] = field(default_factory=dict)
     labels: tuple[str, str] = ("a", "b")
     sources: tuple[str, str] = ("a", "b")
+    engines: tuple[str, str] = ("a", "b")
+    _added: dict[tuple[End, int], Array] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
     def fitted(self) -> list[int]:
@@ -65,6 +69,19 @@ class Problem:
     def fitted_names(self) -> tuple[str, ...]:
         """Their names."""
         return tuple(self.names[i] for i in self.fitted)
+
+    def added(self, end: End, seen: Seen) -> Array:
+        """What the engine of one side adds to what its description says, float32 for one: (N, F, 4, 4)."""
+        recipe, was = (self.a, seen.a) if end == "a" else (self.b, seen.b)
+        key = (end, id(seen))
+        if key not in self._added and recipe is not None:
+            self._added[key] = was - recipe.mechanism.placements(seen.q, self.names)
+        return self._added[key]
+
+    def unturned(self, T: Array) -> Array:
+        """b's placements (N, F, 4, 4) if it gave their inverses."""
+        Y = np.array([self.behind.get(name, np.eye(4)) for name in self.names])
+        return np.asarray(se3.inverse(T @ se3.inverse(Y)) @ Y)
 
     @property
     def reach(self) -> float:
@@ -103,12 +120,16 @@ class State:
     def placements(self, seen: Seen) -> tuple[Array, Array]:
         """Both sides at the configurations of `seen`: as they were seen where nothing is changed, as modelled else."""
         both = []
-        for end, original, was in (("a", self.problem.a, seen.a), ("b", self.problem.b, seen.b)):
-            recipe = self.a if end == "a" else self.b
+        ends: tuple[End, End] = ("a", "b")
+        for end in ends:
+            recipe, original = (self.a, self.problem.a) if end == "a" else (self.b, self.problem.b)
             changed = recipe is not original or any(k.end == end for k in self.shifts)
-            mechanism = self.mechanism(end) if changed else None  # type: ignore[arg-type]
-            both.append(was if mechanism is None else mechanism.placements(seen.q, self.problem.names))
-        return both[0], se3.inverse(both[1]) if self.inverse else both[1]
+            mechanism = self.mechanism(end) if changed else None
+            if mechanism is None:
+                both.append(seen.a if end == "a" else seen.b)
+            else:
+                both.append(mechanism.placements(seen.q, self.problem.names) + self.problem.added(end, seen))
+        return both[0], self.problem.unturned(both[1]) if self.inverse else both[1]
 
     @cached_property
     def now(self) -> tuple[Array, Array]:
@@ -136,9 +157,12 @@ class State:
         """With one structural repair more."""
         return replace(self, a=a, b=b, edits=(*self.edits, change), inverse=self.inverse != inverse)
 
-    def shifted(self, shifts: Mapping[Knob, float]) -> State:
-        """With these shifts instead."""
-        return replace(self, shifts=dict(shifts))
+    def shifted(self, shifts: Mapping[Knob, float], left: float | None = None) -> State:
+        """With these shifts instead; `left`, if it is known already, need not be computed."""
+        state = replace(self, shifts=dict(shifts))
+        if left is not None:
+            state.__dict__["left"] = left  # where cached_property keeps it
+        return state
 
     def changes(self) -> tuple[Change, ...]:
         """Everything changed, in words."""

@@ -134,6 +134,40 @@ class Certificate(Part):
     frames: list[FrameBound] = []
 
 
+class OneChange(Part):
+    """One change, in words. kind: `parameter` for a number, which is then changed by `size` [m or rad]; else a name of the
+    catalogue. side: a, the reference's description; b, the source's; between, the mapping; source, what the source does."""
+
+    text: str
+    kind: str
+    side: Literal["a", "b", "between", "source"]
+    subject: str = ""
+    parameter: str = ""
+    size: Finite = 0.0
+    unit: Literal["m", "rad", ""] = ""
+
+
+class Change(OneChange):
+    """One change of a repair; equivalents: others that do the same in its place."""
+
+    equivalents: list[OneChange] = []
+
+
+class Explanation(Part):
+    """Why a source disagrees: a repair that was made to one side, compared again, and left no more than `after`.
+
+    Errors are the largest over all frames at the configurations it was tried at. No changes: no repair was found, and
+    `unexplained` says where the two part.
+    """
+
+    changes: list[Change] = []
+    unexplained: str = ""
+    before_position: NonNegative = 0.0
+    before_rotation: NonNegative = 0.0
+    after_position: NonNegative = 0.0
+    after_rotation: NonNegative = 0.0
+
+
 class Source(Part):
     """One source: whether it ran, what it was given, and how it compares.
 
@@ -164,6 +198,7 @@ class Source(Part):
     noise: str = ""
     noise_text: str = ""
     explained_by: list[str] = []
+    explanation: Explanation | None = None
     reproducer: Reproducer | None = None
     certificate: Certificate | None = None
 
@@ -281,7 +316,7 @@ class Report(Part):
     """The whole document."""
 
     format: Literal["fk-crosscheck report"] = "fk-crosscheck report"
-    version: Literal["1.1"] = "1.1"
+    version: Literal["1.2"] = "1.2"
     robot: Robot
     settings: Settings
     verdict: Verdict

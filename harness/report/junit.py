@@ -5,7 +5,7 @@ from __future__ import annotations
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
 from harness.report.document import FrameResult, PublishedResult, Report, Source
-from harness.report.text import metres, numbers, plain, radians
+from harness.report.text import metres, numbers, plain, radians, why
 
 
 def render_junit(report: Report) -> str:
@@ -52,6 +52,7 @@ def _frame(report: Report, source: Source, frame: FrameResult) -> TestCase:
     if source.reproducer:
         r = source.reproducer
         lines.append(f"smallest reproducer, frame {r.frame}: q = {numbers(r.q, 17)}, {metres(r.position)}, {radians(r.rotation)}")
+    lines += [f"why: {text.strip()}" for text in why(source)]
     failure.text = "\n".join(plain(line) for line in [*lines, report.settings.command])
     case.result = [failure]
     return case

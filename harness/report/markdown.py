@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from harness.report.document import Report, Source
-from harness.report.text import for_all, metres, numbers, plain, radians
+from harness.report.text import for_all, metres, numbers, plain, radians, why
 
 MARK = {0: "PASS", 1: "FAIL", 3: "INCOMPLETE"}
 MAX_ROWS = 12
@@ -52,6 +52,7 @@ def _disagreements(report: Report) -> list[str]:
             continue
         first = f"first {_md(source.first_disagreeing_frame)}" if source.first_disagreeing_frame else ""
         lines.append(f"- {_code(source.name)}: {len(failing)} of {len(source.frames)} frames are outside tolerance, {first}")
+        lines += [f"  - why: {_md(text)}" if not text.startswith(" ") else f"    - {_md(text.strip())}" for text in why(source)]
         if r := source.reproducer:
             lines.append(f"  - {_md(r.frame)} at q = {_code(numbers(r.q))}: {metres(r.position)}, {radians(r.rotation)} off")
         lines += [f"  - {_md(text)}" for text in source.explained_by[:3]]

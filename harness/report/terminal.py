@@ -7,7 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from harness.report.document import Report, Source
-from harness.report.text import for_all, metres, numbers, plain, radians
+from harness.report.text import for_all, metres, numbers, plain, radians, why
 
 _STYLE = {0: "bold green", 1: "bold red", 3: "bold yellow"}
 MAX_REASONS = 6
@@ -26,6 +26,7 @@ def show(report: Report, console: Console) -> None:
         if not source.reference:
             table.add_row(*_row(source))
     console.print(table)
+    _causes(report, console)
     for source in report.sources:
         _located(source, report.settings.reference, console)
     for reason in report.verdict.reasons[1:MAX_REASONS]:
@@ -64,6 +65,19 @@ def _row(source: Source) -> tuple[Text, ...]:
         Text(f"{metres(source.tolerance.position)}, {radians(source.tolerance.rotation)}"),
         Text(source.noise_text),
     )
+
+
+def _causes(report: Report, console: Console) -> None:
+    """Why sources disagree; those with the same cause together."""
+    groups: dict[tuple[str, ...], list[str]] = {}
+    for source in report.sources:
+        if source.explanation and source.verdict not in ("agrees", "agrees as accepted"):
+            groups.setdefault(tuple(line for line in why(source) if not line.startswith("  tried")), []).append(source.name)
+    for lines, names in groups.items():
+        for i, text in enumerate(lines):
+            head = "  why: " if i == 0 else "       "
+            said = f"{text}  [{', '.join(names)}]" if i == 0 else text
+            console.print(Text(f"{head}{plain(said)}", style="" if text.startswith(" ") else "bold"), soft_wrap=True)
 
 
 def _located(source: Source, reference: str, console: Console) -> None:

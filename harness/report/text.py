@@ -8,6 +8,8 @@ from collections.abc import Iterable
 
 from harness.report.document import Source
 
+MAX_SAME = 3
+
 # C0 and C1 controls, line separators and bidirectional overrides change more than their own letters; surrogates and
 # non-characters cannot be written to XML.
 _CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
@@ -35,6 +37,25 @@ def radians(x: float) -> str:
 def numbers(values: Iterable[float], digits: int = 6) -> str:
     """`[0.2, -1.1, 0]`."""
     return "[" + ", ".join(f"{0.0 if v == 0 else v:.{digits}g}" for v in values) + "]"
+
+
+def why(source: Source) -> list[str]:
+    """The explanation, one change a line, each with what would do the same; then what it leaves. Empty if there is none."""
+    found = source.explanation
+    if found is None:
+        return []
+    if not found.changes:
+        return [f"unexplained: {found.unexplained}"]
+    lines = []
+    for change in found.changes:
+        lines.append(change.text)
+        if change.equivalents:
+            more = f"; and {len(change.equivalents) - MAX_SAME} more" if len(change.equivalents) > MAX_SAME else ""
+            same = "; ".join(other.text for other in change.equivalents[:MAX_SAME])
+            lines.append(f"  the same: {same}{more}")
+    before = f"{metres(found.before_position)}, {radians(found.before_rotation)}"
+    lines.append(f"  tried: {before} before, {metres(found.after_position)}, {radians(found.after_rotation)} after")
+    return lines
 
 
 def for_all(source: Source) -> str:
