@@ -130,7 +130,7 @@ def run(
     """
     limits = Limits(start_timeout, block_timeout, memory_limit * 2**30)
     options = Options(samples, seed, sources, reference, "", certify, explain, all_engines, workers, limits, jobs, in_process)
-    folders = _folders(robots, models or default_models_dir())
+    folders = folders_of(robots, models or default_models_dir())
     prepare(out)
     codes: list[int] = []
     names: dict[str, Path] = {}
@@ -142,7 +142,7 @@ def run(
                 if model.name in names:
                     raise InputError(f"robot name {model.name!r} is also that of {names[model.name]}", where=folder)
                 names[model.name] = folder
-                with _progress(model.name, quiet or as_json) as advance:
+                with progress_bar(model.name, quiet or as_json) as advance:
                     report = crosscheck(model, options.reproduced_by(_command(folder, models, options)), advance, workshop)
                 write_report(report, out)
                 _tell(report, quiet, as_json)
@@ -159,7 +159,8 @@ def run(
     return min((code for code in codes if code), default=0)
 
 
-def _folders(robots: tuple[str, ...], models: Path) -> list[Path]:
+def folders_of(robots: tuple[str, ...], models: Path) -> list[Path]:
+    """The folders of the robots asked for; all of `models`, if none."""
     if not robots:
         return list(model_folders(models).values())
     return list(dict.fromkeys(find_model(robot, models) for robot in robots))
@@ -184,7 +185,7 @@ def _command(folder: Path, models: Path | None, options: Options) -> str:
 
 
 @contextlib.contextmanager
-def _progress(name: str, silent: bool) -> Iterator[Callable[[int, int], None]]:
+def progress_bar(name: str, silent: bool) -> Iterator[Callable[[int, int], None]]:
     """A progress bar on stderr for one robot; none when piped, in CI or when silent."""
     bar = Progress(
         TextColumn("{task.description}", markup=False),

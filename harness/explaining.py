@@ -12,7 +12,7 @@ from harness.analysis.changes import Change
 from harness.analysis.descriptions import X_AXIS, Z_AXIS, Reading
 from harness.analysis.explain import explain
 from harness.analysis.first_difference import first_difference
-from harness.analysis.problem import FAITHFUL, Problem, Seen
+from harness.analysis.problem import FAITHFUL, Problem, Seen, State
 from harness.analysis.recipes import Recipe, TableRecipe, UrdfRecipe
 from harness.binding import Bound
 from harness.description.model import RobotModel
@@ -22,6 +22,7 @@ from harness.se3 import Array
 from harness.sources import pair_tolerance
 
 FITTED, CHECKED = 16, 48
+SHARED = 0.5  # of the tolerance: what another source's repair may leave of this one
 
 
 def problem_of(
@@ -109,11 +110,12 @@ def explain_all(results: Results) -> dict[str, Explained]:
         except Exception as error:  # an engine's failure is its result; the comparison stands without its cause
             found[participant.name] = Explained(unexplained=f"{participant.name} failed: {type(error).__name__}: {error}")
             continue
-        known = next((_of_another(e, p, problem) for p, e in solved if _same(p, problem)), None)
-        if known is None:
-            known = told(problem, results.model)
-            solved.append((problem, known))
-        found[participant.name] = known
+        shared = (_of_another(known, one, problem) for one, known in solved)
+        mine = next((known for known in shared if known is not None), None)
+        if mine is None:
+            mine = told(problem, results.model)
+            solved.append((problem, mine))
+        found[participant.name] = mine
     return found
 
 
@@ -126,26 +128,27 @@ def told(problem: Problem, model: RobotModel) -> Explained:
     return Explained(unexplained=first_difference(problem, model.table.joints, prismatic))
 
 
-def _same(one: Problem, other: Problem) -> bool:
-    """Whether two sources of one kind showed the same, to a tenth of the finer tolerance."""
-    if one.names != other.names or one.sources[1].split(":")[0] != other.sources[1].split(":")[0]:
-        return False
-    errors = fit.errors(one.seen.b, other.seen.b)
-    return all(
-        error <= 0.1 * min(ends) for error, ends in zip(errors, zip(one.tolerance, other.tolerance, strict=True), strict=True)
-    )
+def _of_another(known: Explained, one: Problem, other: Problem) -> Explained | None:
+    """The explanation of one source as that of another that showed the same; None if that does not follow.
 
-
-def _of_another(known: Explained, one: Problem, other: Problem) -> Explained:
-    """The explanation of one source as that of another, which showed the same."""
+    What the repair leaves of one, and what the other is off that one, bound what it leaves of the other.
+    """
+    kinds = [problem.engines[1].split(":")[0] for problem in (one, other)]
+    e = known.explanation
+    if e is None or one.names != other.names or kinds[0] != kinds[1] or one.sources != other.sources:
+        return None
+    apart = [
+        max(pair)
+        for pair in zip(*(fit.errors(x.b, y.b) for x, y in ((one.seen, other.seen), (one.check, other.check))), strict=True)
+    ]
+    left = (e.after[0] + apart[0], e.after[1] + apart[1])
+    if not all(x <= SHARED * limit for x, limit in zip(left, other.tolerance, strict=True)):
+        return None
     old, new = one.engines[1], other.engines[1]
 
     def named(change: Change) -> Change:
         return replace(change, text=change.text.replace(old, new))
 
-    text = known.unexplained.replace(old, new)
-    if known.explanation is None:
-        return Explained(unexplained=text)
-    e = known.explanation
     changes, others = tuple(map(named, e.changes)), tuple(tuple(map(named, slot)) for slot in e.equivalents)
-    return Explained(replace(e, changes=changes, equivalents=others), text)
+    before = State.start(other).errors()
+    return Explained(replace(e, changes=changes, equivalents=others, before=before, after=left))

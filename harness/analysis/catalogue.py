@@ -94,7 +94,7 @@ def _of_recipe(recipe: Recipe | None, end: End, label: str, state: State) -> Ite
     if isinstance(recipe, TableRecipe):
         yield from _of_table(recipe, end, label, state.problem.sources[1])
     else:
-        yield from _of_urdf(recipe, end, label)
+        yield from _of_urdf(recipe, end, label, state.problem.sources[0])
     yield from _of_digits(recipe, label, end)
 
 
@@ -119,7 +119,7 @@ def _of_table(recipe: TableRecipe, end: End, label: str, source: str) -> Iterato
         )
 
 
-def _of_urdf(recipe: UrdfRecipe, end: End, label: str) -> Iterator[tuple[Change, Recipe]]:
+def _of_urdf(recipe: UrdfRecipe, end: End, label: str, other: str) -> Iterator[tuple[Change, Recipe]]:
     for joint in recipe.urdf.joint_list:
         if joint.name not in recipe.joints.names or joint.type == "fixed":
             continue
@@ -132,6 +132,13 @@ def _of_urdf(recipe: UrdfRecipe, end: End, label: str) -> Iterator[tuple[Change,
                 text = f"axis of {joint.name}: {label} has {written}; with {'-' if sign < 0 else ''}{letter} it agrees"
                 change = Change("axis", end, joint.name, letter, sign, text=text)
                 yield change, recipe.with_joint(joint.name, axis=tuple(sign * x for x in axis))
+
+    for joint in recipe.urdf.joint_list:
+        at_the_end = joint.type == "fixed" and not recipe.urdf.children(joint.child) and joint.child in recipe.frames.values()
+        if at_the_end and any((*joint.xyz, *joint.rpy)):
+            text = f"tool: {other} leaves out what {label} has behind the arm, the origin of {joint.name}"
+            zero = (0.0, 0.0, 0.0)
+            yield Change("tool left out", end, joint.name, text=text), recipe.with_joint(joint.name, xyz=zero, rpy=zero)
 
 
 def _of_digits(recipe: Recipe | None, label: str, end: End) -> Iterator[tuple[Change, Recipe]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from harness.analysis.mechanism import Parameter
@@ -56,21 +56,23 @@ class Change:
         return likely + (0.0 if self.side == "a" else 0.5)
 
 
-def of_parameter(side: Side, parameter: Parameter, size: float, before: float, label: str, wanted_by: str) -> Change:
-    """The change of one number of a description. label: the description's name; wanted_by: who would then agree."""
-    change = Change("parameter", side, parameter.owner, parameter.name, size, before, parameter.unit)
-    name = {"yaw": "turned", "pitch": "turned", "roll": "turned"}.get(parameter.name)
+def of_parameter(
+    side: Side, parameter: Parameter, size: float, before: float, label: str, wanted_by: str, resolution: float = 0.0
+) -> Change:
+    """The change of one number of a description. label: the description's name; wanted_by: who would then agree.
+
+    resolution [m, rad]: what lies below it is not said; it is what the repair leaves.
+    """
+    unit, digits = parameter.unit, min(12, max(3, math.floor(-math.log10(4.0 * resolution)))) if resolution > 0 else 12
+    by = amount(round(size, digits), unit)
     if parameter.owner in ("base", "tool"):
-        axis = {"yaw": "z", "pitch": "y", "roll": "x"}.get(parameter.name, parameter.name)
-        by = f"{amount(size, parameter.unit)} {'about' if name else 'along'} {axis}"
-        text = f"{parameter.owner}: {wanted_by} has it {name or 'moved'} by {by}"
+        turned = {"yaw": "z", "pitch": "y", "roll": "x"}.get(parameter.name)
+        how = f"turned by {by} about {turned}" if turned else f"moved by {by} along {parameter.name}"
+        text = f"{parameter.owner}: {wanted_by} has it {how}"
     else:
-        change_by = amount(size, parameter.unit)
-        text = (
-            f"{parameter.name} of {parameter.owner}: {value(before, parameter.unit)} in {label}, "
-            f"{value(before + size, parameter.unit)} in {wanted_by} ({change_by})"
-        )
-    return replace(change, text=text)
+        here, there = value(before, unit, 12), value(before + size, unit, digits)
+        text = f"{parameter.name} of {parameter.owner}: {here} in {label}, {there} in {wanted_by} ({by})"
+    return Change("parameter", side, parameter.owner, parameter.name, size, before, unit, text)
 
 
 def amount(x: float, unit: str) -> str:
@@ -80,8 +82,8 @@ def amount(x: float, unit: str) -> str:
     return f"{math.degrees(x):+.6g} deg" if abs(x) >= 1e-6 else f"{x:+.4g} rad"
 
 
-def value(x: float, unit: str) -> str:
-    """`0.089159 m`, `90 deg`; what no model file says is not shown, a whole turn or a picometre."""
+def value(x: float, unit: str, digits: int) -> str:
+    """`0.089159 m`, `90 deg`, without whole turns and what lies beyond so many digits [m, rad]."""
     if unit == "m":
-        return f"{round(x, 12) + 0.0:.9g} m"
-    return f"{round(math.degrees(math.remainder(x, 2.0 * math.pi)), 9) + 0.0:.9g} deg"
+        return f"{round(x, digits) + 0.0:.9g} m"
+    return f"{round(math.degrees(math.remainder(x, 2.0 * math.pi)), max(1, digits - 2)) + 0.0:.9g} deg"

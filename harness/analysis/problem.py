@@ -17,7 +17,7 @@ from harness.analysis.recipes import Recipe
 from harness.se3 import Array
 
 End: TypeAlias = Literal["a", "b"]
-FAITHFUL = 0.1  # a model of a source reproduces it to this part of the tolerance, or is not used
+FAITHFUL = 0.5  # a model of a source reproduces it to this part of the tolerance, or is not used
 
 
 class Knob(NamedTuple):
@@ -173,9 +173,8 @@ class State:
                 continue
             i = 0 if knob.end == "a" else 1
             before = recipe.mechanism.value(knob.parameter)
-            words.append(
-                of_parameter(knob.end, knob.parameter, size, before, self.problem.labels[i], self.problem.sources[1 - i])
-            )
+            by = self.problem.sources[1 - i]
+            words.append(of_parameter(knob.end, knob.parameter, size, before, self.problem.labels[i], by, self.left))
         return (*self.edits, *words)
 
 

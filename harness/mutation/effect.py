@@ -1,0 +1,81 @@
+"""How far a mutant moves what a source would show, by the in-house models alone: what the gate could know at best."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.analysis import fit
+from harness.analysis.descriptions import X_AXIS, Z_AXIS, Reading
+from harness.analysis.recipes import TableRecipe, UrdfRecipe
+from harness.description.model import RobotModel
+from harness.engines.registry import adapter_of, kind_of, registered
+from harness.mutation.controller import controller
+from harness.mutation.mutant import Mutant
+from harness.se3 import Array
+
+SAMPLES = 200
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Of one mutant on one source, at each mapped frame (F,): discrepancy and its distance from the original's, [m], [rad]."""
+
+    frames: tuple[str, ...]
+    position: Array
+    rotation: Array
+    position_change: Array
+    rotation_change: Array
+
+
+def effect_of(mutant: Mutant, original: RobotModel, source: str) -> Effect:
+    """Without rounding, float32 and all that engines add."""
+    law = original.configurations
+    q = np.concatenate([law.fixed_q, np.random.default_rng(1).uniform(law.lower, law.upper, (SAMPLES, len(law.lower)))])
+    names = tuple(f.name for f in original.frames.frames if kind_of(source) == "dh" or f.urdf is not None)
+    was = _pair(original, source, q, names, None)
+    now = _pair(mutant.model, source, q, names, mutant.fault or None)
+    D_was, D_now = was[0] - was[1], now[0] - now[1]
+    change = D_now - D_was
+    return Effect(
+        names,
+        np.linalg.norm(D_now[..., :3, 3], axis=-1).max(axis=0),
+        np.linalg.norm(D_now[..., :3, :3], axis=(-2, -1)).max(axis=0) / np.sqrt(2.0),
+        np.linalg.norm(change[..., :3, 3], axis=-1).max(axis=0),
+        np.linalg.norm(change[..., :3, :3], axis=(-2, -1)).max(axis=0) / np.sqrt(2.0),
+    )
+
+
+def _pair(model: RobotModel, source: str, q: Array, names: tuple[str, ...], fault: str | None) -> tuple[Array, Array]:
+    """Placements (N, F, 4, 4) of the reference and of the source; offsets of rigid frames measured."""
+    frames = {f.name: f for f in model.frames.frames if f.name in names}
+    labels = {n: (f.dh, np.eye(4) if f.offset is None else f.offset) for n, f in frames.items()}
+    T_a = TableRecipe(model.table, labels).mechanism.placements(q, names)
+    if fault and kind_of(source) == "dh":
+        engine = controller(fault, model)
+        raw = engine.placements(q, [frames[n].dh for n in names])
+        return T_a, raw @ np.array([labels[n][1] for n in names])
+    if kind_of(source) == "dh" or model.urdf is None or model.urdf_joints is None:
+        return T_a, T_a
+    prismatic = tuple(model.table.kind(j) == "prismatic" for j in model.table.joints)
+    links = {n: f.urdf or "" for n, f in frames.items()}
+    base, reading = model.frames.base.urdf or "", _reading(source, fault)
+    T_b = UrdfRecipe(model.urdf, base, links, model.urdf_joints, model.table.joints, prismatic, reading).mechanism.placements(
+        q, names
+    )
+    rigid = [i for i, n in enumerate(names) if frames[n].offset is None]
+    if rigid:
+        T_a[:, rigid] = T_a[:, rigid] @ fit.behind(T_a[:, rigid], T_b[:, rigid])
+    return T_a, T_b
+
+
+def _reading(source: str, fault: str | None) -> Reading:
+    """How the engine is known to read a URDF, by its traits. The harness passes followers their values."""
+    traits: Mapping[str, object] = {t.key: t for t in adapter_of(source).traits} if source in registered() else {}
+    return Reading(
+        default_axis=Z_AXIS if "missing-axis-z" in traits else X_AXIS,
+        stretched="prismatic-scaled" in traits,
+        mimic=fault != "mimic ignored",
+    )

@@ -1,0 +1,169 @@
+"""Mutants that are no single number: joints, units, conventions, frames, tools, digits, and what a controller does wrong."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from lxml import etree
+
+from harness import se3
+from harness.analysis.catalogue import CUT
+from harness.description.dh import DHRow
+from harness.description.model import RobotModel
+from harness.mutation.mutant import Cause, Fault, Mutant, with_frames, with_row, with_rows
+from harness.mutation.numbers import with_urdf
+
+OFFSETS = ((math.pi / 2, "pi/2"), (math.radians(1.0), "1 deg"))
+
+
+def of_joints(model: RobotModel) -> Iterator[Mutant]:
+    """Signs, zero offsets, neighbours exchanged, couplings: on the table's side, and in the map to the URDF's joints."""
+    table, moving = model.table, [i for i, row in enumerate(model.table.rows) if row.kind != "fixed"]
+    for n, i in enumerate(moving):
+        row = table.rows[i]
+        if row.kind == "revolute":
+            for size, text in OFFSETS:
+                cause = Cause("parameter", row.name, "theta", -size)
+                yield Mutant(
+                    f"{row.name} offset by {text}", "table", "offset", with_row(model, i, theta=row.theta + size), (cause,)
+                )
+        yield from _of_map(model, n)
+    for i, j in pairwise(moving):
+        one, other = table.rows[i], table.rows[j]
+        if one.kind == other.kind:
+            rows = list(table.rows)
+            rows[i], rows[j] = replace(one, name=other.name), replace(other, name=one.name)
+            swapped = _reordered(with_rows(model, rows), model)
+            yield Mutant(
+                f"{one.name} and {other.name} exchanged", "table", "order", swapped, (Cause("order", one.name, other.name),)
+            )
+
+
+def _reordered(mutated: RobotModel, model: RobotModel) -> RobotModel:
+    """The map to the URDF's joints, its columns in the order of the mutant's joints."""
+    if model.urdf_joints is None:
+        return mutated
+    columns = [model.table.joints.index(name) for name in mutated.table.joints]
+    return replace(mutated, urdf_joints=replace(model.urdf_joints, A=model.urdf_joints.A[:, columns]))
+
+
+def _of_map(model: RobotModel, n: int) -> Iterator[Mutant]:
+    joints, own = model.urdf_joints, model.table.joints
+    if joints is None:
+        return
+    row = int(np.flatnonzero(joints.A[:, n])[0])
+    name = own[n]
+    A = joints.A.copy()
+    A[row] *= -1.0
+    cause = Cause("sign", name)
+    yield Mutant(
+        f"{name} sign in the mapping", "mapping", "joint sign", replace(model, urdf_joints=replace(joints, A=A)), (cause,)
+    )
+    if model.table.kind(name) != "revolute":
+        return
+    for size, text in OFFSETS:
+        b = joints.b.copy()
+        b[row] += size
+        cause = Cause("parameter", joints.names[row], "zero", -size)
+        mutated = replace(model, urdf_joints=replace(joints, b=b))
+        yield Mutant(f"{name} offset by {text} in the mapping", "mapping", "offset", mutated, (cause,))
+    if n > 0 and model.table.kind(own[n - 1]) == "revolute":
+        A = joints.A.copy()
+        A[row, n - 1] += A[row, n]
+        mutated = replace(model, urdf_joints=replace(joints, A=A))
+        yield Mutant(f"{name} coupled to {own[n - 1]}", "mapping", "coupling", mutated, (Cause("coupling", name, own[n - 1]),))
+
+
+def of_whole(model: RobotModel) -> Iterator[Mutant]:
+    """Convention, degrees, millimetres, float32, 3.1416: on the table, and on the URDF."""
+    table = model.table
+    other = "modified" if table.convention == "standard" else "standard"
+    yield Mutant(
+        "rows read as the other convention",
+        "table",
+        "convention",
+        with_rows(model, table.rows, convention=other),
+        (Cause("convention"),),
+    )
+
+    def lengths(r: DHRow) -> DHRow:
+        return replace(r, a=r.a * 1e3, d=r.d * 1e3)
+
+    T = [M.copy() for M in (table.base, table.tool)]
+    for M in T:
+        M[:3, 3] *= 1e3
+    cause = (Cause("millimetres"),)
+    yield Mutant(
+        "table in millimetres",
+        "table",
+        "millimetres",
+        with_rows(model, [lengths(r) for r in table.rows], base=T[0], tool=T[1]),
+        cause,
+    )
+    yield _rows(model, "table in degrees", "degrees", lambda x, angle: math.degrees(x) if angle else x, Cause("degrees"))
+    yield _rows(model, "table as float32", "float32", lambda x, angle: float(np.float32(x)), Cause("float32"))
+    yield _rows(model, "table with pi = 3.1416", "3.1416", lambda x, angle: _cut(x) if angle else x, Cause("truncated pi"))
+    if model.urdf is not None:
+        yield _origins(
+            model, "URDF in millimetres", "millimetres", lambda x, angle: x if angle else x * 1e3, Cause("millimetres")
+        )
+        yield _origins(model, "URDF in degrees", "degrees", lambda x, angle: math.degrees(x) if angle else x, Cause("degrees"))
+        yield _origins(model, "URDF as float32", "float32", lambda x, angle: float(np.float32(x)), Cause("float32"))
+        yield _origins(model, "URDF with pi = 3.1416", "3.1416", lambda x, angle: _cut(x) if angle else x, Cause("truncated pi"))
+
+
+def _cut(x: float) -> float:
+    twelfths = round(x / (math.pi / 12))
+    return twelfths * CUT[1] / 12 if twelfths and abs(x - twelfths * math.pi / 12) < 1e-8 else x
+
+
+def _rows(model: RobotModel, name: str, operator: str, edit: object, cause: Cause) -> Mutant:
+    f = edit if callable(edit) else None
+    if f is None:
+        raise ValueError("expected a function")
+    rows = [
+        replace(r, a=f(r.a, False), d=f(r.d, False), alpha=f(r.alpha, True), theta=f(r.theta, True)) for r in model.table.rows
+    ]
+    return Mutant(name, "table", operator, with_rows(model, rows), (cause,))
+
+
+def _origins(model: RobotModel, name: str, operator: str, edit: object, cause: Cause) -> Mutant:
+    if model.urdf is None or not callable(edit):
+        raise ValueError("expected a model with a URDF, and a function")
+    robot = etree.fromstring(model.urdf.text.encode())
+    for origin in robot.iter("origin"):
+        for attribute, angle in (("xyz", False), ("rpy", True)):
+            if text := origin.get(attribute):
+                origin.set(attribute, " ".join(repr(edit(float(word), angle)) for word in text.split()))
+    return Mutant(name, "urdf", operator, with_urdf(model, robot), (cause,))
+
+
+def of_tool(model: RobotModel) -> Iterator[Mutant]:
+    """The tool left out; where there is none, one of 150 mm that the other side does not know."""
+    table, last = model.table, model.table.rows[-1]
+    if not np.array_equal(table.tool, np.eye(4)):
+        missing = with_rows(model, table.rows, tool=np.eye(4))
+        yield Mutant("tool missing", "table", "tool missing", missing, (Cause("tool left out"),))
+    elif last.kind == "fixed" and last.d:
+        mutated = with_row(model, len(table.rows) - 1, d=0.0)
+        yield Mutant("tool missing", "table", "tool missing", mutated, (Cause("parameter", last.name, "d", last.d),))
+    else:
+        label = str(len(table.rows))
+        frames = [replace(f, dh="tool") if f.dh == label else f for f in model.frames.frames]
+        longer = with_frames(with_rows(model, table.rows, tool=se3.translation((0.0, 0.0, 0.15))), frames)
+        yield Mutant("a tool of 150 mm on one side", "table", "tool missing", longer, (Cause("tool left out"),))
+
+
+def of_controllers(model: RobotModel) -> Iterator[Mutant]:
+    """What an implementation does wrong with the right table: run as a program of its own."""
+    faults: tuple[tuple[Fault, Cause], ...] = (
+        ("degrees", Cause("degrees", "q")),
+        ("inverse", Cause("inverse")),
+        ("reversed", Cause("reversed")),
+    )
+    for fault, cause in faults:
+        yield Mutant(f"controller: {fault}", "controller", fault, model, (cause,), fault)

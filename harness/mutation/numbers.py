@@ -1,0 +1,89 @@
+"""Mutants of single numbers, on either side: a part, a millimetre, ten micrometres, a nanometre, the sign."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from lxml import etree
+
+from harness.analysis.mechanism import Parameter
+from harness.description.joints import mapped_chain
+from harness.description.model import RobotModel
+from harness.description.urdf_file import parse_urdf
+from harness.description.urdf_lint import check
+from harness.mutation.mutant import Cause, Mutant, with_row
+
+STEPS = (
+    ("1 mm, 1 mrad", 1e-3, {"m": "1 mm", "rad": "1 mrad"}),
+    ("10 um, 10 urad", 1e-5, {"m": "10 um", "rad": "10 urad"}),
+    ("1 nm, 1 nrad", 1e-9, {"m": "1 nm", "rad": "1 nrad"}),
+)
+
+
+def changes_of(value: float, unit: str) -> Iterator[tuple[str, str, float]]:
+    """(operator, what was done, change) for one number [m or rad]."""
+    for operator, step, names in STEPS:
+        yield operator, f"+ {names[unit]}", step
+    if value != 0.0:
+        yield "10 %", "+ 10 %", 0.1 * value
+        yield "10 %", "- 10 %", -0.1 * value
+        yield "sign", "negated", -2.0 * value
+
+
+def of_table(model: RobotModel) -> Iterator[Mutant]:
+    """Every number of dh.csv."""
+    for i, row in enumerate(model.table.rows):
+        for name, unit in (("a", "m"), ("alpha", "rad"), ("d", "m"), ("theta", "rad")):
+            value = float(getattr(row, name))
+            for operator, text, change in changes_of(value, unit):
+                mutated = with_row(model, i, **{name: value + change})
+                cause = Cause("parameter", row.name, name, -change)
+                yield Mutant(f"{name} of {row.name} {text}", "table", operator, mutated, (cause,))
+
+
+def of_urdf(model: RobotModel) -> Iterator[Mutant]:
+    """Every number of the origin of every joint on the mapped chain."""
+    if model.urdf is None:
+        return
+    for joint in mapped_chain(model.urdf, model.frames).values():
+        numbers = (
+            *(("xyz", k, v, "m") for k, v in enumerate(joint.xyz)),
+            *(("rpy", k, v, "rad") for k, v in enumerate(joint.rpy)),
+        )
+        for attribute, k, value, unit in numbers:
+            parameter = Parameter(joint.name, f"origin {'xyz'[k]}" if unit == "m" else ("roll", "pitch", "yaw")[k], "m")
+            for operator, text, change in changes_of(value, unit):
+                values = [v + change if i == k else v for i, v in enumerate(getattr(joint, attribute))]
+                mutated = with_origin(model, joint.name, attribute, values)
+                cause = Cause("parameter", joint.name, parameter.name, -change)
+                yield Mutant(f"{parameter.name} of {joint.name} {text}", "urdf", operator, mutated, (cause,))
+
+
+def with_origin(model: RobotModel, joint: str, attribute: str, values: list[float]) -> RobotModel:
+    """The model with one attribute of a joint's origin written anew."""
+
+    def edit(element: etree._Element) -> None:
+        origin = element.find("origin")
+        if origin is None:
+            origin = etree.SubElement(element, "origin")
+        origin.set(attribute, " ".join(repr(float(v)) for v in values))
+
+    return with_joint(model, joint, edit)
+
+
+def with_joint(model: RobotModel, joint: str, edit: object) -> RobotModel:
+    """The model with one `<joint>` of its URDF edited as XML, and the file read again."""
+    if model.urdf is None or not callable(edit):
+        raise ValueError("expected a model with a URDF, and a function")
+    robot = etree.fromstring(model.urdf.text.encode())
+    edit(next(e for e in robot.iter("joint") if e.get("name") == joint))
+    return with_urdf(model, robot)
+
+
+def with_urdf(model: RobotModel, robot: etree._Element) -> RobotModel:
+    """The model with another URDF."""
+    if model.urdf is None:
+        raise ValueError("expected a model with a URDF")
+    urdf = parse_urdf(etree.tostring(robot), model.urdf.path)
+    return replace(model, urdf=urdf, findings=check(urdf))

@@ -1,0 +1,96 @@
+"""Runs the mutants of all robots over the cores: each process makes its own, by number."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import lru_cache
+from pathlib import Path
+
+from harness.crosscheck import crosscheck
+from harness.description.model import RobotModel, load_model
+from harness.engines.environments import where
+from harness.engines.registry import adapter_of
+from harness.errors import EngineUnavailable
+from harness.mutation.controller import FaultyWorkers
+from harness.mutation.mutant import Mutant
+from harness.mutation.score import MutationScore, Trial, score
+from harness.mutation.trial import SAMPLES, mutants_of, try_out
+from harness.options import Options
+
+SOURCES = ("urdf:pinocchio", "urdf:pytorch-kinematics")
+CHUNK = 12
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+Progress = Callable[[int, int], None]
+
+
+@lru_cache(maxsize=1)
+def _prepared(folder: Path) -> tuple[RobotModel, list[Mutant]]:
+    model = load_model(folder)
+    return model, list(mutants_of(model))
+
+
+@lru_cache(maxsize=1)
+def _workers() -> FaultyWorkers:
+    return FaultyWorkers()
+
+
+@lru_cache(maxsize=1)
+def _known(folder: Path, source: str) -> int:
+    """How many changes explain the accepted deviations of the original."""
+    model = _prepared(folder)[0]
+    if not model.file.accepted:
+        return 0
+    report = crosscheck(model, Options(SAMPLES, 0, (source,), certify=False, in_process=True), None, _workers())
+    found = report.sources[-1].explanation
+    return len(found.changes) if found else 0
+
+
+def _chunk(folder: Path, indices: Sequence[int], sources: Sequence[str]) -> list[Trial]:
+    """Some mutants of one robot."""
+    model, mutants = _prepared(folder)
+    known = _known(folder, sources[0]) if sources else 0
+    return [trial for i in indices for trial in try_out(mutants[i], model, sources, _workers(), known)]
+
+
+def present(sources: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Which of the sources can run here, in this environment; and why not the others."""
+    here, absent = [], []
+    for source in sources:
+        adapter = adapter_of(source)
+        try:
+            where(adapter)
+            here.append(source)
+        except EngineUnavailable as error:
+            absent.append(str(error))
+    return here, absent
+
+
+def run_mutants(
+    folders: Sequence[Path], sources: Sequence[str], every: int, jobs: int, progress: Progress | None
+) -> MutationScore:
+    """Every `every`-th mutant of each robot, in `jobs` processes (0: one a core)."""
+    started = time.perf_counter()
+    here, absent = present(sources)
+    tasks = []
+    for folder in folders:
+        count = len(_prepared(folder)[1])
+        chosen = range(0, count, every)
+        tasks += [(folder, list(chosen[k : k + CHUNK]), here) for k in range(0, len(chosen), CHUNK)]
+    done: dict[int, list[Trial]] = {}
+    total, finished = sum(len(t[1]) for t in tasks), 0
+    for name in THREADS:  # the cores are shared among processes, not fought over by their libraries
+        os.environ.setdefault(name, "1")
+    with ProcessPoolExecutor(jobs or os.cpu_count() or 1, multiprocessing.get_context("spawn")) as pool:
+        futures = {pool.submit(_chunk, *task): k for k, task in enumerate(tasks)}
+        for future in as_completed(futures):
+            done[futures[future]] = future.result()
+            finished += len(tasks[futures[future]][1])
+            if progress:
+                progress(finished, total)
+    trials = [trial for k in sorted(done) for trial in done[k]]
+    return score(trials, every, round(time.perf_counter() - started, 1), absent)
