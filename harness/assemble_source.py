@@ -17,7 +17,7 @@ from harness.engines.registry import adapter_of
 from harness.errors import CrosscheckError
 from harness.report import document as doc
 from harness.results import Explained, Results
-from harness.sources import Participant, deviation_on_file, pair_tolerance
+from harness.sources import Participant, cause_on_file, deviation_on_file, pair_tolerance
 
 
 def assemble_source(results: Results, participant: Participant) -> doc.Source:
@@ -60,6 +60,7 @@ def _judged(results: Results, comparison: Comparison, participant: Participant, 
         for index in range(len(results.model.frames.frames))
         if all(end.should_have(index) for end in ends)
     ]
+    frames = _by_cause(results, participant.name, frames, tolerance)
     failing = [f for f in frames if f.verdict in FAILING]
     if not frames:
         update = {"status": "failed", "verdict": "failed", "reason": f"has no frame in common with {reference.name}"}
@@ -82,6 +83,28 @@ def _judged(results: Results, comparison: Comparison, participant: Participant, 
             "certificate": certificate,
         }
     )
+
+
+def _by_cause(
+    results: Results, source: str, frames: list[doc.FrameResult], tolerance: tuple[float, float]
+) -> list[doc.FrameResult]:
+    """Accepted frames whose deviation is of the size on file, but has another cause, or one more: changed."""
+    on_file = cause_on_file(results.model, source, results.participants[0].name)
+    if not on_file or not results.options.explain or all(f.verdict != "accepted" for f in frames):
+        return frames
+    told = results.explained.get(source)
+    e = told.explanation if told else None
+    slots = [(c, *others) for c, others in zip(e.changes, e.equivalents, strict=True)] if e else []
+    # What is below the tolerance of this source is not its to tell.
+    slots = [slot for slot in slots if slot[0].kind != "parameter" or abs(slot[0].size) > max(tolerance)]
+
+    def as_filed(slot: tuple[Change, ...]) -> bool:
+        pairs = ((c.size, on_file.get((c.subject, c.parameter))) for c in slot if c.kind == "parameter")
+        return any(size is not None and abs(found - size) <= 2.0 * max(tolerance) for found, size in pairs)
+
+    if len(slots) == len(on_file) and all(as_filed(slot) for slot in slots):
+        return frames
+    return [f.model_copy(update={"verdict": "deviation changed"}) if f.verdict == "accepted" else f for f in frames]
 
 
 def _unfit(comparison: Comparison, participant: Participant) -> str:

@@ -162,3 +162,9 @@ def deviation_on_file(model: RobotModel, source: str, reference: str, frame: str
     if theirs is None or own is None:
         return own or theirs
     return None
+
+
+def cause_on_file(model: RobotModel, source: str, reference: str) -> dict[tuple[str, str], float]:
+    """Which numbers explain the accepted deviations of a source, {(joint, parameter): change [m or rad]}; empty if none do."""
+    entries = [e for e in model.file.accepted if e.covers(source) != e.covers(reference)]
+    return {(joint, name): size for e in entries for joint, part in e.cause.items() for name, size in part.items()}

@@ -41,11 +41,16 @@ class _Axis:
     prismatic: bool
 
 
-def canonical(screws: Screws, prismatic: list[bool], convention: Convention, names: list[str]) -> Canonical:
-    """DH parameters of the chain. Raises ValueError if a screw is no joint's (a helical or zero twist)."""
+def canonical(
+    screws: Screws, prismatic: list[bool], convention: Convention, names: list[str], parallel: float = PARALLEL
+) -> Canonical:
+    """DH parameters of the chain. Raises ValueError if a screw is no joint's (a helical or zero twist).
+
+    parallel: sine of the angle below which two axes have no common normal of their own.
+    """
     axes = _axes(screws, prismatic, names)
     free = [f"{name} slides: its axis may stand anywhere" for name, slides in zip(names, prismatic, strict=True) if slides]
-    frames = _frames(axes, screws.M, convention, names, free)
+    frames = _frames(axes, screws.M, convention, names, free, parallel)
     row = _standard_row if convention == "standard" else _modified_row
     rows = [
         row(name, se3.inverse(frames[i]) @ frames[i + 1], axis.prismatic)
@@ -91,7 +96,7 @@ def _across(z: Array, wish: Array) -> Array:
 
 
 def _normal(
-    first: _Axis, second: _Axis, near: Array, x: Array, free: list[str], names: tuple[str, str]
+    first: _Axis, second: _Axis, near: Array, x: Array, free: list[str], names: tuple[str, str], parallel: float
 ) -> tuple[Array, Array, Array]:
     """Common normal of two axes: unit direction, its foot on the first and on the second.
 
@@ -99,7 +104,7 @@ def _normal(
     """
     cross = np.cross(first.z, second.z)
     sine = float(np.linalg.norm(cross))
-    if sine < PARALLEL:
+    if sine < parallel:
         foot = first.point + ((near - first.point) @ first.z) * first.z
         other = second.point + ((foot - second.point) @ second.z) * second.z
         across = other - foot
@@ -132,7 +137,9 @@ def _shifted(axis: _Axis, near: Array) -> _Axis:
     return _Axis(axis.z, near, True) if axis.prismatic else axis
 
 
-def _frames(axes: list[_Axis], M: Array, convention: Convention, names: list[str], free: list[str]) -> list[Array]:
+def _frames(
+    axes: list[_Axis], M: Array, convention: Convention, names: list[str], free: list[str], parallel: float
+) -> list[Array]:
     """Frames 0 ... n at q = 0, each x on the common normal of two neighbouring axes, at its foot on one of them.
 
     Standard: z_(i-1) along joint i's axis, frame i on axis i + 1. Modified: z_i along it, frame i on axis i.
@@ -142,7 +149,7 @@ def _frames(axes: list[_Axis], M: Array, convention: Convention, names: list[str
     for i in range(len(axes) - 1):
         near, x = frames[-1][:3, 3], frames[-1][:3, 0]
         following = _shifted(axes[i + 1], near)
-        x, first, second = _normal(current, following, near, x, free, (names[i], names[i + 1]))
+        x, first, second = _normal(current, following, near, x, free, (names[i], names[i + 1]), parallel)
         frames.append(_frame(x, following.z, second) if convention == "standard" else _frame(x, current.z, first))
         current = following
     return [*frames, _last(current, M, convention)]

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.analysis import fit
+from harness.analysis.align import aligned
 from harness.analysis.catalogue import fine, structural
 from harness.analysis.changes import Change
 from harness.analysis.frame_names import renamed
@@ -43,7 +44,7 @@ def explain(problem: Problem) -> Explanation | None:
     start = State.start(problem)
     if not all(np.isfinite(T).all() for T in start.now) or start.agrees():
         return None
-    for find in (_one, _two_at_once, _two_and_two, _two, _three, _many):
+    for find in (_one, _two_at_once, _two_and_two, _laid_on, _two, _three, _many):
         if (found := find(start)) is not None:
             return _told(start, found)
     return None
@@ -76,6 +77,12 @@ def _two_and_two(start: State) -> State | None:
     return None
 
 
+def _laid_on(start: State) -> State | None:
+    """Base, tool, signs and zero offsets together, if they are all it takes."""
+    state = aligned(start)
+    return None if state is None or not state.agrees() else _fewer(state)
+
+
 def _two(start: State) -> State | None:
     """One change, then another, all numbers fitted together."""
     for state in _promising(start, BEAM):
@@ -93,12 +100,16 @@ def _three(start: State) -> State | None:
 
 
 def _many(start: State) -> State | None:
-    """As many numbers as it takes, one after the other, each the one that leaves least; then those that are not needed out."""
-    for first in (start, *_promising(start, 2)):
+    """As many numbers as it takes, one after the other, each the one that leaves least; then those that are not needed out.
+
+    From where the chains lie on each other as well as they can, then from where they are.
+    """
+    laid = aligned(start)
+    for first in (*((laid,) if laid is not None else ()), start, *_promising(start, FEW)):
         state = first
         while state.size < first.size + MANY:
             ranked = sorted((s for s in _numbers(state) if s.size > state.size), key=lambda s: s.left)
-            better = [p for s in ranked[:3] if (p := polish(s)) is not None and p.left < state.left]
+            better = [p for s in ranked[:FEW] if (p := polish(s)) is not None and p.left < 0.9 * state.left]
             if not better:
                 break
             state = min(better, key=lambda s: s.left)

@@ -69,7 +69,8 @@ class AcceptedEntry(Strict):
     """One `[[accepted]]` deviation: for each source and frame the largest discrepancy, right to within `within` (relative).
 
     `source` may be a pattern such as `urdf:*`: what is wrong in the URDF is wrong in every engine. `position` [m] or
-    `rotation` [rad] left out means: that part must be below tolerance.
+    `rotation` [rad] left out means: that part must be below tolerance. `cause`: the numbers that explain it, joint, then
+    parameter, then the change that repairs it [m or rad]; an explanation by anything else, or by more, is a change.
     """
 
     source: SourceName | list[SourceName]
@@ -77,6 +78,7 @@ class AcceptedEntry(Strict):
     position: Number = Field(default=0.0, ge=0)
     rotation: Number = Field(default=0.0, ge=0)
     within: Number = Field(default=0.02, gt=0, lt=1)
+    cause: dict[str, dict[str, Number]] = {}
     reason: str = Field(min_length=1)
 
     @model_validator(mode="after")

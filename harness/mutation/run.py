@@ -20,6 +20,7 @@ from harness.mutation.mutant import Mutant
 from harness.mutation.score import MutationScore, Trial, score
 from harness.mutation.trial import SAMPLES, mutants_of, try_out
 from harness.options import Options
+from harness.report.document import Change
 
 SOURCES = ("urdf:pinocchio", "urdf:pytorch-kinematics")
 CHUNK = 12
@@ -40,20 +41,20 @@ def _workers() -> FaultyWorkers:
 
 
 @lru_cache(maxsize=1)
-def _known(folder: Path, source: str) -> int:
-    """How many changes explain the accepted deviations of the original."""
+def _known(folder: Path, source: str) -> list[Change]:
+    """The changes that explain the accepted deviations of the original."""
     model = _prepared(folder)[0]
     if not model.file.accepted:
-        return 0
+        return []
     report = crosscheck(model, Options(SAMPLES, 0, (source,), certify=False, in_process=True), None, _workers())
     found = report.sources[-1].explanation
-    return len(found.changes) if found else 0
+    return found.changes if found else []
 
 
 def _chunk(folder: Path, indices: Sequence[int], sources: Sequence[str]) -> list[Trial]:
     """Some mutants of one robot."""
     model, mutants = _prepared(folder)
-    known = _known(folder, sources[0]) if sources else 0
+    known = _known(folder, sources[0]) if sources else []
     return [trial for i in indices for trial in try_out(mutants[i], model, sources, _workers(), known)]
 
 

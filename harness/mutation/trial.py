@@ -31,8 +31,10 @@ def mutants_of(model: RobotModel) -> Iterator[Mutant]:
         yield from make(model)
 
 
-def try_out(mutant: Mutant, original: RobotModel, sources: Sequence[str], workers: FaultyWorkers, known: int) -> list[Trial]:
-    """Cross-check the mutant; one trial for each source. known: changes that explain the original, accepted ones."""
+def try_out(
+    mutant: Mutant, original: RobotModel, sources: Sequence[str], workers: FaultyWorkers, known: Sequence[doc.Change]
+) -> list[Trial]:
+    """Cross-check the mutant; one trial for each source. known: what explains the original."""
     named = (NAMES[mutant.fault],) if mutant.fault else (*sources, *(s for s in mutant.extra if s not in sources))
     workers.model = mutant.model
     commands = ((named[0], (str(mutant.fault),)),) if mutant.fault else ()
@@ -49,7 +51,7 @@ def try_out(mutant: Mutant, original: RobotModel, sources: Sequence[str], worker
     return [_judged(mutant, original, by_name[source], effect_of(mutant, original, source), known) for source in named]
 
 
-def _judged(mutant: Mutant, original: RobotModel, source: doc.Source, effect: Effect, known: int) -> Trial:
+def _judged(mutant: Mutant, original: RobotModel, source: doc.Source, effect: Effect, known: Sequence[doc.Change]) -> Trial:
     trial = Trial.of(mutant, original.name, source.name, "", "")
     largest = float(max(effect.position_change.max(initial=0.0), effect.rotation_change.max(initial=0.0)))
     trial = trial.model_copy(update={"effect": largest})
@@ -84,13 +86,14 @@ def _floor(effect: Effect, original: RobotModel, source: doc.Source) -> str | No
     return f"within the margin of an accepted deviation, and {floor}" if hidden else floor
 
 
-def _cause(mutant: Mutant, source: doc.Source, known: int) -> tuple[str, bool]:
+def _cause(mutant: Mutant, source: doc.Source, known: Sequence[doc.Change]) -> tuple[str, bool]:
     """What was told, and whether the first group names the cause, with joint and size, and nothing beside what was known."""
     found = source.explanation
     if found is None or not found.changes:
         return (found.unexplained if found else "nothing"), False
     told = " and ".join(change.text for change in found.changes)
-    hit = any(
-        cause.named_by(said) for cause in mutant.causes for change in found.changes for said in (change, *change.equivalents)
-    )
-    return told, hit and len(found.changes) <= 1 + known
+    # A number that was off before is off by both.
+    before = {(one.subject, one.parameter): one.size for change in known for one in (change, *change.equivalents)}
+    causes = [c if c.size is None else replace(c, size=c.size + before.get((c.subject, c.parameter), 0.0)) for c in mutant.causes]
+    hit = any(cause.named_by(said) for cause in causes for change in found.changes for said in (change, *change.equivalents))
+    return told, hit and len(found.changes) <= 1 + len(known)
