@@ -19,10 +19,9 @@ from harness.description.dh import Convention
 from harness.description.locate import default_models_dir, find_model
 from harness.description.model import load_model
 from harness.description.tidy import angle_text, is_identity, number_text, transform_toml
-from harness.description.urdf import Urdf
 from harness.description.urdf_file import read_urdf
 from harness.description.urdf_lint import check
-from harness.errors import InputError
+from harness.operands import only_leaf
 from harness.options import Options
 from harness.report.document import Report
 from harness.report.files import write
@@ -49,7 +48,7 @@ def derive_dh(
     """
     urdf = read_urdf(urdf_path)
     check(urdf)
-    derived = derive(urdf, base or urdf.roots[0], tip or _only_leaf(urdf), cast(Convention, convention), source)
+    derived = derive(urdf, base or urdf.roots[0], tip or only_leaf(urdf), cast(Convention, convention), source)
     robot = name or re.sub(r"[^A-Za-z0-9_.-]", "_", urdf_path.stem).lstrip("_.-") or "robot"
     _show(derived)
     report = verify(derived, robot, source, out)
@@ -65,13 +64,6 @@ def verify(derived: Derived, name: str, source: str, out: Path | None) -> Report
     with tempfile.TemporaryDirectory() as temporary:
         folder = write_model(derived, name, source, out or Path(temporary))
         return crosscheck(load_model(folder), Options(SAMPLES, 0, (source,)))
-
-
-def _only_leaf(urdf: Urdf) -> str:
-    leaves = [link for link in urdf.links if not urdf.children(link)]
-    if len(leaves) != 1:
-        raise InputError(f"expected --tip: the file has {len(leaves)} leaves", where=urdf.path, hint=", ".join(leaves[:12]))
-    return leaves[0]
 
 
 def _show(derived: Derived) -> None:

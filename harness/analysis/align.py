@@ -81,9 +81,8 @@ def _based(state: State, prismatic: list[bool]) -> State:
     shifts = dict(state.shifts)
     for owner, T in (("base", X), ("tool", Y)):
         roll, pitch, yaw = se3.to_rpy(T)
-        angles = (("yaw", yaw), ("pitch", pitch), ("roll", roll))
-        numbers = [*(Parameter(owner, k, "m") for k in "xyz"), *(Parameter(owner, k, "rad") for k, _ in angles)]
-        for parameter, size in zip(numbers, (*T[:3, 3], *(v for _, v in angles)), strict=True):
+        numbers = [*(Parameter(owner, f"move {k}", "m") for k in "xyz"), *(Parameter(owner, f"turn {k}", "rad") for k in "zyx")]
+        for parameter, size in zip(numbers, (*T[:3, 3], yaw, pitch, roll), strict=True):
             if parameter in known and abs(size) > NOTHING:
                 shifts[Knob("a", parameter)] = float(size)
     return state.shifted(shifts)

@@ -12,6 +12,8 @@ from harness.analysis.mechanism import Parameter
 Unit: TypeAlias = Literal["m", "rad", ""]
 Side: TypeAlias = Literal["a", "b", "between", "source"]
 
+GAUGE = ("move ", "turn ")  # the numbers of a base or a tool that no file has
+
 # The first is said first. Parameters are ranked by `_parameter_rank`.
 _PLAIN = (
     "base frame", "tool left out", "frame", "mimic", "axis default", "axis length", "truncated pi", "float32", "convention",
@@ -49,7 +51,7 @@ class Change:
 
     def _parameter_rank(self) -> float:
         """Quarter turns of base or tool, then numbers on file, those that were not zero first, then other bases and tools."""
-        if self.subject in ("base", "tool"):
+        if self.parameter.startswith(GAUGE):
             quarters = self.size / (math.pi / 2)
             return 0.0 if self.unit == "rad" and abs(quarters - round(quarters)) < 1e-6 else 4.0
         likely = 1.0 if self.before != 0.0 else 2.0
@@ -65,9 +67,9 @@ def of_parameter(
     """
     unit, digits = parameter.unit, min(12, max(3, math.floor(-math.log10(4.0 * resolution)))) if resolution > 0 else 12
     by = amount(round(size, digits), unit)
-    if parameter.owner in ("base", "tool"):
-        turned = {"yaw": "z", "pitch": "y", "roll": "x"}.get(parameter.name)
-        how = f"turned by {by} about {turned}" if turned else f"moved by {by} along {parameter.name}"
+    if parameter.name.startswith(GAUGE):
+        verb, axis = parameter.name.split()
+        how = f"turned by {by} about {axis}" if verb == "turn" else f"moved by {by} along {axis}"
         text = f"{parameter.owner}: {wanted_by} has it {how}"
     else:
         here, there = value(before, unit, 12), value(before + size, unit, digits)

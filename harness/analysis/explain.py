@@ -104,8 +104,7 @@ def _many(start: State) -> State | None:
 
     From where the chains lie on each other as well as they can, then from where they are.
     """
-    laid = aligned(start)
-    for first in (*((laid,) if laid is not None else ()), start, *_promising(start, FEW)):
+    for first in _starts(start):
         state = first
         while state.size < first.size + MANY:
             ranked = sorted((s for s in _numbers(state) if s.size > state.size), key=lambda s: s.left)
@@ -116,6 +115,16 @@ def _many(start: State) -> State | None:
             if state.agrees():
                 return _fewer(state)
     return None
+
+
+def _starts(start: State) -> Iterator[State]:
+    """Where a search for many numbers begins: with every pi written out, laid on each other; then as they are."""
+    exact = start
+    for end in ("a", "b"):
+        cut = [s for s in fine(exact) if s.edits[-1].key == ("truncated pi", end, "", "", 0.0)]
+        exact = cut[0] if cut else exact
+    laid = [state for state in (aligned(exact), aligned(start) if exact is not start else None) if state is not None]
+    yield from (*laid, start, *_promising(start, FEW))
 
 
 def _singles(state: State) -> Iterator[State]:
@@ -181,7 +190,12 @@ def _polished(state: State) -> State | None:
 
 
 def _fewer(state: State) -> State:
-    """Without the numbers that it agrees without."""
+    """Without the numbers, and the digits, that it agrees without."""
+    for change in state.edits:
+        if change.kind == "truncated pi":
+            rest = _without(State.start(state.problem), state, change)
+            if rest is not None and (found := _polished(rest)) is not None:
+                state = found
     for knob in sorted(state.shifts, key=lambda k: abs(state.shifts[k])):
         rest = state.shifted({k: x for k, x in state.shifts.items() if k != knob})
         if rest.shifts and (found := _polished(rest)) is not None:
@@ -197,20 +211,13 @@ def _told(start: State, found: State) -> Explanation:
         rest = _without(start, found, own)
         if rest is not None:
             kept = {change.key for change in rest.changes()}
-            tried = _accepted(_refitted(rest))
+            tried = _accepted(_singles(rest))  # the others stay as they are: else it would be another repair
             least = max(min((s.left for s in tried), default=0.0), found.left)
             alike = [s for s in tried if s.left <= SAME_MECHANISM * least + 1e-15]
             said.update({c.key: c for s in alike for c in s.changes() if c.key not in kept and c.key != own.key})
         slots.append(tuple(sorted(said.values(), key=lambda c: c.rank)))
     slots.sort(key=lambda slot: slot[0].rank)
     return Explanation(tuple(s[0] for s in slots), tuple(s[1:] for s in slots), start.errors(), found.errors())
-
-
-def _refitted(rest: State) -> Iterator[State]:
-    """Every state with one change more; numbers fitted before may have to give way."""
-    for state in _singles(rest):
-        better = polish(state) if rest.shifts and state.left < rest.left else state
-        yield state if better is None else better
 
 
 def _without(start: State, found: State, change: Change) -> State | None:

@@ -18,7 +18,7 @@ STRAIGHT = 1e-6
 
 @dataclass(frozen=True)
 class Difference:
-    """One number of two mechanisms: whose, which, both values [m or rad]."""
+    """One number of two mechanisms: of a joint, or from one to the next; which; both values [m or rad]."""
 
     joint: str
     name: str
@@ -58,7 +58,7 @@ def match(a: Sequence[DHRow], b: Sequence[DHRow]) -> Matching:
         for sign in (1, -1):
             options = []
             for previous, (cost, signs, normals, differences) in best.items():
-                normal, link = _link(a[i], b[i], previous != sign)
+                normal, link = _link(a[i], b[i], previous != sign, f"{a[i].name} to {a[i + 1].name}")
                 found = link if i + 1 in free else (*link, Difference(a[i + 1].name, "d", "m", a[i + 1].d, sign * b[i + 1].d))
                 worst = max(cost[0], *(d.size for d in found))
                 total = (worst, cost[1] + sum(d.size for d in found), cost[2] + (sign < 0))
@@ -74,14 +74,14 @@ def _rounded(cost: tuple[float, float, int]) -> tuple[float, float, int]:
     return round(cost[0], 9), round(cost[1], 9), cost[2]
 
 
-def _link(a: DHRow, b: DHRow, turned: bool) -> tuple[int, tuple[Difference, ...]]:
+def _link(a: DHRow, b: DHRow, turned: bool, between: str) -> tuple[int, tuple[Difference, ...]]:
     """The common normal's sign, and the differences it leaves."""
     twist = b.alpha + (math.pi if turned else 0.0)
     options = []
     for normal in (1, -1):
         found = (
-            Difference(a.name, "a", "m", a.a, normal * b.a),
-            Difference(a.name, "alpha", "rad", a.alpha, _near(normal * twist, a.alpha)),
+            Difference(between, "a", "m", a.a, normal * b.a),
+            Difference(between, "alpha", "rad", a.alpha, _near(normal * twist, a.alpha)),
         )
         options.append((round(max(d.size for d in found), 9), -normal, normal, found))
     _, _, normal, found = min(options, key=lambda option: option[:2])

@@ -53,6 +53,8 @@ def residual(state: State) -> Array:
 
 def polish(state: State) -> State | None:
     """The shifts fitted together, None if they do not converge. What they leave undetermined takes the shortest step."""
+    if not set(state.shifts) <= set(knobs(state)):  # an edit has taken the number out
+        return None
     last, best = np.inf, state
     for _ in range(STEPS):
         r = residual(state)

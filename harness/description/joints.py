@@ -92,7 +92,7 @@ def resolve_joints(entries: Mapping[str, JointEntry], table: DHTable, urdf: Urdf
             row[table.joints.index(other)] += factor
         rows[joint.name] = (row, entry.offset)
     _check_chain(source, urdf, frames, path)
-    return _complete(rows, urdf, len(table.joints))
+    return complete(rows, urdf, len(table.joints))
 
 
 def _target(name: str, entry: JointEntry, table: DHTable, urdf: Urdf, path: Path) -> UrdfJoint:
@@ -130,7 +130,7 @@ def _check_chain(source: Mapping[str, str], urdf: Urdf, frames: FrameMap, path: 
                 line=joint.line,
                 hint="no DH row can describe it; map frames on one side of it only",
             )
-        leader = _leader(urdf, joint)
+        leader = leader_of(urdf, joint)
         if joint.type in MOVABLE and leader.name not in source:
             moved = sum(j.type in MOVABLE and j.mimic is None for j in on_chain.values())
             raise MappingError(
@@ -139,7 +139,7 @@ def _check_chain(source: Mapping[str, str], urdf: Urdf, frames: FrameMap, path: 
                 where=path,
                 key="joints",
             )
-    leaders = {_leader(urdf, j).name for j in on_chain.values()}
+    leaders = {leader_of(urdf, j).name for j in on_chain.values()}
     for joint_name, name in source.items():
         if joint_name not in leaders:
             raise MappingError(
@@ -158,14 +158,15 @@ def mapped_chain(urdf: Urdf, frames: FrameMap) -> dict[str, UrdfJoint]:
     return chain
 
 
-def _leader(urdf: Urdf, joint: UrdfJoint) -> UrdfJoint:
+def leader_of(urdf: Urdf, joint: UrdfJoint) -> UrdfJoint:
+    """The joint that a follower follows in the end; a joint that follows none itself."""
     while joint.mimic is not None:
         joint = urdf.joints[joint.mimic.joint]
     return joint
 
 
-def _complete(rows: dict[str, tuple[Array, float]], urdf: Urdf, n: int) -> JointMap:
-    """Add held joints at zero and followers at multiplier * leader + offset."""
+def complete(rows: Mapping[str, tuple[Array, float]], urdf: Urdf, n: int) -> JointMap:
+    """The map of n model joints whose rows (A, b) are given by URDF joint; held joints at zero, followers after their leader."""
 
     def row(joint: UrdfJoint) -> tuple[Array, float]:
         if joint.mimic is None:

@@ -56,16 +56,20 @@ def locate_urdf(file: str, package: str | None, folder: Path) -> Path:
         raise ModelFileError(
             f"no URDF {file!r} under urdf/; {nearest(file, present)}", where=folder / "model.toml", key="urdf.file"
         )
+    return packaged_file(package, file, folder / "model.toml", "urdf.file")
+
+
+def packaged_file(package: str, file: str, where: Path | None = None, key: str | None = None) -> Path:
+    """The one file of an installed distribution whose path ends in `file`. Raises ModelFileError, DescriptionUnavailable."""
     try:
         files = metadata.files(package) or []
     except metadata.PackageNotFoundError:
-        raise DescriptionUnavailable(
-            f"{folder / 'model.toml'}: urdf.package: {package} is not installed; pip install {package}"
-        ) from None
+        place = f"{where}: urdf.package: " if where else ""
+        raise DescriptionUnavailable(f"{place}{package} is not installed; pip install {package}") from None
     wanted = PurePosixPath(file).parts
     matches = [f for f in files if PurePosixPath(str(f)).parts[-len(wanted) :] == wanted]
     if len(matches) != 1:
         urdfs = [str(f) for f in files if str(f).endswith(".urdf")]
         found = f"{len(matches)} files end in it" if matches else nearest(file, urdfs)
-        raise ModelFileError(f"no such file {file!r} in {package}: {found}", where=folder / "model.toml", key="urdf.file")
+        raise ModelFileError(f"no such file {file!r} in {package}: {found}", where=where, key=key)
     return Path(str(matches[0].locate())).resolve()
