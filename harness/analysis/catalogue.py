@@ -155,24 +155,19 @@ def _of_digits(recipe: Recipe | None, label: str, end: End) -> Iterator[tuple[Ch
             text = f"truncated pi: with pi cut to {pi:g} in {label} both agree"
             yield Change("truncated pi", end, size=pi, text=text), short
     text = f"float32: with the numbers of {label} rounded to float32 both agree"
-    yield Change("float32", end, text=text), _rounded(recipe)
+    yield Change("float32", end, size=32.0, text=text), _numbers(recipe, lambda x, angle: float(np.float32(x)))
+    numbers: list[float] = []
+    exact_there = _numbers(recipe, lambda x, angle: numbers.append(x) or _written_out(x, angle))  # type: ignore[func-returns-value]
+    if numbers and all(float(np.float32(x)) == x for x in numbers):
+        text = f"float32: the numbers of {label} are float32; written out in full they agree"
+        yield Change("float32", end, size=64.0, text=text), exact_there
 
 
-def _angles(recipe: Recipe, change: Callable[[float], float]) -> tuple[Recipe, list[str]]:
-    """Every angle of a description changed, and those that differ by it, as text."""
-    found: list[str] = []
-
-    def edit(x: float) -> float:
-        y = change(x)
-        if y != x:
-            found.append(repr(x))
-        return y
-
-    if isinstance(recipe, TableRecipe):
-        rows = tuple(replace(r, alpha=edit(r.alpha), theta=edit(r.theta)) for r in recipe.table.rows)
-        return replace(recipe, table=replace(recipe.table, rows=rows)), list(dict.fromkeys(found))
-    joints = tuple(replace(j, rpy=tuple(edit(x) for x in j.rpy)) for j in recipe.urdf.joint_list)
-    return replace(recipe, urdf=replace(recipe.urdf, joint_list=joints)), list(dict.fromkeys(found))
+def _written_out(x: float, angle: bool) -> float:
+    """The number that was meant by a float32: a multiple of pi / 12, or the shortest decimal that rounds to it."""
+    single = np.float32(x)
+    multiple = round(x / (math.pi / 12)) * math.pi / 12
+    return multiple if angle and multiple and np.float32(multiple) == single else float(str(single))
 
 
 def _uncut(x: float) -> float:
@@ -189,16 +184,30 @@ def _cut(x: float, pi: float) -> float:
     return twelfths * pi / 12 if twelfths and abs(x - twelfths * math.pi / 12) < 1e-14 else x
 
 
-def _rounded(recipe: Recipe) -> Recipe:
-    def single(x: float) -> float:
-        return float(np.float32(x))
-
+def _numbers(recipe: Recipe, edit: Callable[[float, bool], float]) -> Recipe:
+    """Every number of a description changed; edit(x, whether it is an angle)."""
     if isinstance(recipe, TableRecipe):
         rows = tuple(
-            replace(r, a=single(r.a), d=single(r.d), alpha=single(r.alpha), theta=single(r.theta)) for r in recipe.table.rows
+            replace(r, a=edit(r.a, False), d=edit(r.d, False), alpha=edit(r.alpha, True), theta=edit(r.theta, True))
+            for r in recipe.table.rows
         )
         return replace(recipe, table=replace(recipe.table, rows=rows))
     joints = tuple(
-        replace(j, xyz=tuple(single(x) for x in j.xyz), rpy=tuple(single(x) for x in j.rpy)) for j in recipe.urdf.joint_list
+        replace(j, xyz=tuple(edit(x, False) for x in j.xyz), rpy=tuple(edit(x, True) for x in j.rpy))
+        for j in recipe.urdf.joint_list
     )
     return replace(recipe, urdf=replace(recipe.urdf, joint_list=joints))
+
+
+def _angles(recipe: Recipe, change: Callable[[float], float]) -> tuple[Recipe, list[str]]:
+    """Every angle of a description changed, and those that differ by it, as text."""
+    found: list[str] = []
+
+    def edit(x: float, angle: bool) -> float:
+        y = change(x) if angle else x
+        if y != x:
+            found.append(repr(x))
+        return y
+
+    edited = _numbers(recipe, edit)
+    return edited, list(dict.fromkeys(found))

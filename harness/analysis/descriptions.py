@@ -47,10 +47,8 @@ def of_table(table: DHTable, frames: Mapping[str, tuple[str, Array]], backwards:
 def gauge(factors: list[Factor], parent: int, owner: str) -> int:
     """Append a transform that is the identity, with its six numbers as parameters; returns the last factor's index."""
     moves = [Factor(0, False, axis, parameter=Parameter(owner, f"move {axis}", "m")) for axis in "xyz"]
-    turns = zip("zyx", ("yaw", "pitch", "roll"), strict=True)
-    return _chained(
-        factors, parent, [*moves, *(Factor(0, True, axis, parameter=Parameter(owner, n, "rad")) for axis, n in turns)]
-    )
+    turns = [Factor(0, True, axis, parameter=Parameter(owner, f"turn {axis}", "rad")) for axis in "zyx"]
+    return _chained(factors, parent, [*moves, *turns])
 
 
 def _chained(factors: list[Factor], parent: int, steps: Sequence[Factor]) -> int:
