@@ -5,11 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from harness import se3
 from harness.analysis.components import View, components, mapped, matrices
+from harness.analysis.fit import mean_transform
 from harness.description.engine_names import placement_in_base
 from harness.description.frames import MappedFrame, unchecked_joint
 from harness.description.frames_file import EngineNames
@@ -20,6 +22,13 @@ from harness.engines.process import ProcessEngine
 from harness.engines.registry import kind_of
 from harness.errors import EngineFailed, nearest
 from harness.se3 import Array
+
+
+class Measured(NamedTuple):
+    """A measured offset T_dh_link (4, 4), and the largest entry by which it changes with q."""
+
+    offset: Array
+    spread: float
 
 
 @dataclass
@@ -174,7 +183,7 @@ def _constant(frame: MappedFrame, kind: str, names: EngineNames, offsets: Mappin
     return offsets.get(frame.name, np.eye(4)) if frame.offset is None else frame.offset
 
 
-def measure_rigid(model: RobotModel, in_house: Bound, urdf_source: Bound, q: Array) -> dict[str, Array]:
+def measure_rigid(model: RobotModel, in_house: Bound, urdf_source: Bound, q: Array) -> dict[str, Measured]:
     """Offset of each rigid frame, by frame name: the mean of T_dh_link = T_base_dh^-1 T_base_link over q (N, n).
 
     A mean over evenly spread configurations, not one of them: an offset taken at one absorbs whatever discrepancy there is
@@ -185,8 +194,7 @@ def measure_rigid(model: RobotModel, in_house: Bound, urdf_source: Bound, q: Arr
     offsets = {}
     for i, frame in enumerate(model.frames.frames):
         if frame.relation == "rigid" and i in T_base_link and np.isfinite(T_base_link[i]).all():
-            mean = (se3.inverse(T_base_dh[i]) @ T_base_link[i]).mean(axis=0)
-            U, _, Vt = np.linalg.svd(mean[:3, :3])
-            mean[:3, :3] = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
-            offsets[frame.name] = mean
+            T_dh_link = se3.inverse(T_base_dh[i]) @ T_base_link[i]
+            mean = mean_transform(T_dh_link)
+            offsets[frame.name] = Measured(mean, float(np.abs(T_dh_link - mean).max()))
     return offsets

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import time
+from collections.abc import Mapping
 from functools import partial
+
+import numpy as np
 
 from harness.analysis.compare import Comparison
 from harness.analysis.shrink import shrink
@@ -66,20 +69,25 @@ def _load(planned: Planned, model: RobotModel, workers: Workers) -> Engine:
 
 
 def _bind_all(results: Results, workers: Workers) -> None:
-    """Load every engine, measure each rigid offset with the first URDF source that has the frame, then bind for good."""
+    """Load every engine, measure each rigid offset, then bind for good.
+
+    With the first URDF source that has the frame, or a later one in which the offset is nearer to constant, if it is not.
+    """
     model = results.model
     q = model.configurations.lattice()
     in_house = bind(DHNumpy(model.table), model, {})
     rigid = {frame.name for frame in model.frames.frames if frame.relation == "rigid"}
-    engines = {}
+    engines: dict[str, Engine] = {}
+    spreads: dict[str, float] = {}
     tasks = [(p, workers.submit(partial(_load, p.planned, model, workers))) for p in results.participants]
     for participant, task in tasks:
         try:
             engine = engines[participant.name] = task.result()
             participant.bound = bind(engine, model, {})
-            if rigid - set(results.offsets) and kind_of(participant.name) == "urdf":
-                for name, offset in measure_rigid(model, in_house, participant.bound, q).items():
-                    if results.offsets.setdefault(name, offset) is offset:
+            if kind_of(participant.name) == "urdf" and (loose := _loose(rigid, spreads, participant)):
+                for name, measured in measure_rigid(model, in_house, participant.bound, q).items():
+                    if name in loose and measured.spread < spreads.get(name, np.inf):
+                        results.offsets[name], spreads[name] = measured
                         results.measured_from[name] = participant.name
         except Exception as error:  # an engine's failure is its result
             participant.fail(error)
@@ -88,6 +96,12 @@ def _bind_all(results: Results, workers: Workers) -> None:
             participant.bound = bind(engines[participant.name], model, results.offsets)
             _check_frames(participant, model, participant is results.participants[0])
     results.in_house = bind(DHNumpy(model.table), model, results.offsets)
+
+
+def _loose(rigid: set[str], spreads: Mapping[str, float], participant: Participant) -> set[str]:
+    """Rigid frames without an offset yet, or with one that moves by more than the tolerance: no rigid one, as it was measured."""
+    limit = max(participant.planned.tolerance.position, participant.planned.tolerance.rotation)
+    return {name for name in rigid if spreads.get(name, np.inf) > limit}
 
 
 def _check_frames(participant: Participant, model: RobotModel, is_reference: bool) -> None:

@@ -159,9 +159,7 @@ def test_base_tool_signs_and_zero_offsets_do_not_matter(
 ) -> None:
     table = models[robot].table
     rng = np.random.default_rng(seed)
-    rows = tuple(
-        replace(r, theta=r.theta + rng.uniform(-3, 3)) if r.kind == "revolute" else replace(r, d=r.d + 0.3) for r in table.rows
-    )
+    rows = tuple(replace(r, theta=r.theta + rng.uniform(-3, 3)) if r.kind == "revolute" else r for r in table.rows)
     changed = replace(table, rows=rows, base=base @ table.base, tool=table.tool @ tool)
     own, other = rows_of(of_table(table)), rows_of(of_table(changed))
     assert not isinstance(own, str)
@@ -172,7 +170,7 @@ def test_base_tool_signs_and_zero_offsets_do_not_matter(
 
 
 def test_a_joint_that_turns_the_other_way_is_found(models: dict[str, RobotModel]) -> None:
-    """Axes 3 and 5 of a Panda turned round, in its URDF; where two axes meet at right angles and d is 0, a sign is a zero offset."""
+    """Axes 3 and 5 of a Panda turned round, in its URDF. Where d is 0 and axes meet, a sign is a zero offset."""
     model = models["panda"]
     assert model.urdf is not None
     joints = tuple(

@@ -95,7 +95,8 @@ def bound_problem(model: RobotModel, source: Engine, tolerance: float = 1e-10): 
     in_house = bind(DHNumpy(model.table), model, {})
     assert model.urdf is not None
     q = model.configurations.lattice()
-    offsets = measure_rigid(model, in_house, bind(UrdfPinocchio(model.urdf), model, {}), q)
+    measured = measure_rigid(model, in_house, bind(UrdfPinocchio(model.urdf), model, {}), q)
+    offsets = {name: m.offset for name, m in measured.items()}
     reference = bind(DHNumpy(model.table), model, offsets)
     return problem_of(model, offsets, reference, bind(source, model, offsets), (tolerance, tolerance))
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from harness import se3
@@ -13,7 +11,7 @@ from harness.analysis.changes import Change
 from harness.analysis.invariants import match, zero_offsets
 from harness.analysis.mechanism import Parameter
 from harness.analysis.problem import Knob, State
-from harness.analysis.recipes import TableRecipe
+from harness.analysis.recipes import TableRecipe, mixed
 from harness.analysis.screws import ANGLE_STEP, LENGTH_STEP, Screws, fit_gauge, log
 from harness.se3 import Array
 
@@ -36,8 +34,7 @@ def aligned(state: State) -> State | None:
         if sign < 0 and state.a is not None:
             P = np.diag([-1.0 if n == name else 1.0 for n in names])
             text = f"{name} turns the other way in {state.problem.sources[1]}: its sign is flipped"
-            mixed = replace(state.a, handling=state.a.handling.mixed(P))
-            state = state.edited(Change("sign", "between", name, text=text), mixed, state.b)
+            state = state.edited(Change("sign", "between", name, text=text), mixed(state.a, P), state.b)
     offsets = zero_offsets(rows[0], rows[1], matching)
     zeros = {}
     for name, slides, offset in zip(names, prismatic, offsets, strict=True):

@@ -14,7 +14,7 @@ import numpy as np
 
 from harness.analysis.changes import Change
 from harness.analysis.problem import End, State
-from harness.analysis.recipes import Recipe, TableRecipe, UrdfRecipe
+from harness.analysis.recipes import Recipe, TableRecipe, UrdfRecipe, mixed
 from harness.description.dh import Convention, DHRow
 from harness.description.values import find_truncation
 
@@ -39,10 +39,6 @@ def fine(state: State) -> Iterator[State]:
     yield from (state.edited(change, state.a, b) for change, b in _of_digits(state.b, state.problem.labels[1], "b"))
 
 
-def _mixed(recipe: Recipe, P: np.ndarray) -> Recipe:
-    return replace(recipe, handling=recipe.handling.mixed(P))
-
-
 def _of_joints(state: State) -> Iterator[tuple[Change, Recipe]]:
     """What the source does with q: signs, order, couplings, degrees. Shown on the reference: it takes P q for q."""
     if state.a is None:
@@ -54,24 +50,24 @@ def _of_joints(state: State) -> Iterator[tuple[Change, Recipe]]:
         P = np.eye(n)
         P[i, i] = -1.0
         text = f"{joint} turns the other way in {source}: its sign is flipped"
-        yield Change("sign", "between", joint, text=text), _mixed(state.a, P)
+        yield Change("sign", "between", joint, text=text), mixed(state.a, P)
     for i in range(n):
         for j in range(i + 1, n):
             if slides[i] == slides[j]:
                 P = np.eye(n)
                 P[[i, j]] = P[[j, i]]
                 text = f"{joints[i]} and {joints[j]} are exchanged in {source}: the joint order differs"
-                yield Change("order", "between", joints[i], joints[j], text=text), _mixed(state.a, P)
+                yield Change("order", "between", joints[i], joints[j], text=text), mixed(state.a, P)
     if n > 2:
         text = f"the joints are in reverse order in {source}"
-        yield Change("order", "between", "all", "reversed", text=text), _mixed(state.a, np.eye(n)[::-1])
+        yield Change("order", "between", "all", "reversed", text=text), mixed(state.a, np.eye(n)[::-1])
     for i, j in permutations(range(n), 2):
         for factor in (1.0, -1.0):
             P = np.eye(n)
             P[i, j] = factor
             sign = "+" if factor > 0 else "-"
             text = f"{joints[i]} is coupled in {source}: it moves by {joints[i]} {sign} {joints[j]}"
-            yield Change("coupling", "between", joints[i], joints[j], factor, text=text), _mixed(state.a, P)
+            yield Change("coupling", "between", joints[i], joints[j], factor, text=text), mixed(state.a, P)
     turns = ~np.array(slides, dtype=bool)
     if turns.any():
         for factor, how in (
@@ -79,7 +75,7 @@ def _of_joints(state: State) -> Iterator[tuple[Change, Recipe]]:
             (DEGREES, "reads degrees as radians: its joint values are 57.3 times too large"),
         ):
             text = f"degrees: {source} {how}"
-            yield Change("degrees", "source", "q", size=factor, text=text), _mixed(state.a, np.diag(np.where(turns, factor, 1.0)))
+            yield Change("degrees", "source", "q", size=factor, text=text), mixed(state.a, np.diag(np.where(turns, factor, 1.0)))
 
 
 def _of_recipe(recipe: Recipe | None, end: End, label: str, state: State) -> Iterator[tuple[Change, Recipe]]:
@@ -87,15 +83,26 @@ def _of_recipe(recipe: Recipe | None, end: End, label: str, state: State) -> Ite
         return
     for factor, unit in ((1000.0, "metres where millimetres are meant"), (0.001, "millimetres where metres are meant")):
         change = Change("millimetres", end, size=factor, text=f"lengths of {label} are in {unit}: a factor of 1000")
-        yield change, replace(recipe, handling=replace(recipe.handling, length=recipe.handling.length * factor))
+        yield change, _scaled(recipe, factor, 1.0)
     for factor, unit in ((DEGREES, "radians where degrees are meant"), (1.0 / DEGREES, "degrees where radians are meant")):
         change = Change("degrees", end, "description", size=factor, text=f"angles of {label} are in {unit}")
-        yield change, replace(recipe, handling=replace(recipe.handling, angle=recipe.handling.angle * factor))
+        yield change, _scaled(recipe, 1.0, factor)
     if isinstance(recipe, TableRecipe):
         yield from _of_table(recipe, end, label, state.problem.sources[1])
     else:
         yield from _of_urdf(recipe, end, label, state.problem.sources[0])
     yield from _of_digits(recipe, label, end)
+
+
+def _scaled(recipe: Recipe, length: float, angle: float) -> Recipe:
+    """Every length and angle of a description in another unit; the mapping's offsets are not the description's."""
+    scaled = _numbers(recipe, lambda x, turns: x * (angle if turns else length))
+    if not isinstance(scaled, TableRecipe):
+        return scaled
+    transforms = [T.copy() for T in (scaled.table.base, scaled.table.tool)]
+    for T in transforms:
+        T[:3, 3] *= length
+    return replace(scaled, table=replace(scaled.table, base=transforms[0], tool=transforms[1]))
 
 
 def _of_table(recipe: TableRecipe, end: End, label: str, source: str) -> Iterator[tuple[Change, Recipe]]:

@@ -126,10 +126,10 @@ def _harmonics(T: Array, xi: Array, moves: Mask) -> tuple[Array, Array, Array]:
 def behind(T: Array, wanted: Array) -> Array:
     """The constant Y (4, 4) of each frame for which T Y comes nearest to `wanted`, (F, 4, 4)."""
     gap = se3.inverse(T) @ wanted
-    return np.array([_mean(gap[:, f]) for f in range(gap.shape[1])])
+    return np.array([mean_transform(gap[:, f]) for f in range(gap.shape[1])])
 
 
-def _mean(T: Array) -> Array:
+def mean_transform(T: Array) -> Array:
     """Mean of transforms (..., 4, 4), the rotation in the chordal sense (Moakher 2002, doi:10.1137/S0895479801383877)."""
     mean = T.reshape(-1, 4, 4).mean(axis=0)
     U, _, Vt = np.linalg.svd(mean[:3, :3])

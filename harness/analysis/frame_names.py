@@ -12,7 +12,7 @@ from harness.analysis import fit
 from harness.analysis.changes import Change
 from harness.analysis.descriptions import SPECIFIED, of_table
 from harness.analysis.problem import State
-from harness.analysis.recipes import TableRecipe, UrdfRecipe
+from harness.analysis.recipes import TableRecipe, UrdfRecipe, asked
 from harness.se3 import Array
 
 SAME = 1e-9
@@ -53,7 +53,7 @@ def _read_as_specified(state: State, b: UrdfRecipe) -> Iterator[State]:
 def _links(state: State, b: UrdfRecipe) -> dict[str, Array]:
     """Placements (N, 4, 4) of every link that hangs together with the base."""
     names = {name: name for name in b.urdf.links}
-    T = b.handling.applied(b.bare(b.base, names)).placements(state.problem.seen.q)
+    T = asked(b.bare(b.base, names), b.P).placements(state.problem.seen.q)
     return dict(zip(names, np.moveaxis(T, 1, 0), strict=True))
 
 
@@ -115,7 +115,7 @@ def _other_labels(state: State, a: TableRecipe) -> Iterator[State]:
     if not off or a.backwards:
         return
     labels = {label: (label, np.eye(4)) for label in a.table.frames}
-    placed = a.handling.applied(of_table(a.table, labels)).placements(state.problem.seen.q)
+    placed = asked(of_table(a.table, labels), a.P).placements(state.problem.seen.q)
     for i in off:
         name = state.problem.names[i]
         here, offset = a.frames[name]

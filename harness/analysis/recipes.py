@@ -1,51 +1,27 @@
 """How a description becomes a mechanism, as data: what a structural repair changes before the mechanism is built again.
 
-A recipe is a DH table or a URDF, where each compared frame is in it, and what is done to the result: joint values mixed,
-lengths and angles in another unit. Edits of one recipe compose, whatever their order.
+A recipe is a DH table or a URDF, where each compared frame is in it, and how the implementation mixes its joint values. Edits of
+one recipe compose, whatever their order.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeAlias
 
 from harness.analysis.descriptions import SPECIFIED, Reading, of_table, of_urdf
-from harness.analysis.mechanism import Factor, Mechanism
+from harness.analysis.mechanism import Mechanism
 from harness.description.dh import DHTable
 from harness.description.joints import JointMap
 from harness.description.urdf import Urdf
 from harness.se3 import Array
 
 
-@dataclass(frozen=True)
-class Handling:
-    """What an implementation does besides the product of its factors.
-
-    P: (n, n), it takes P q for q; length, angle: factors on every constant length and angle of the description.
-    """
-
-    P: Array | None = None
-    length: float = 1.0
-    angle: float = 1.0
-
-    def applied(self, mechanism: Mechanism) -> Mechanism:
-        """The mechanism so handled."""
-        if self.length != 1.0 or self.angle != 1.0:
-            mechanism = mechanism.edited(self._scaled)
-        return mechanism if self.P is None else mechanism.driven(self.P)
-
-    def _scaled(self, factor: Factor) -> Factor:
-        if factor.T is not None:
-            T = factor.T.copy()
-            T[:3, 3] *= self.length
-            return replace(factor, T=T)
-        return replace(factor, value=factor.value * (self.angle if factor.turns else self.length))
-
-    def mixed(self, P: Array) -> Handling:
-        """The same, taking P q for q first."""
-        return replace(self, P=P if self.P is None else self.P @ P)
+def asked(mechanism: Mechanism, P: Array | None) -> Mechanism:
+    """The mechanism of an implementation that takes P q for q; P (n, n), None for q itself."""
+    return mechanism if P is None else mechanism.driven(P)
 
 
 @dataclass(frozen=True)
@@ -55,12 +31,12 @@ class TableRecipe:
     table: DHTable
     frames: Mapping[str, tuple[str, Array]]
     backwards: bool = False
-    handling: Handling = field(default_factory=Handling)
+    P: Array | None = None
 
     @cached_property
     def mechanism(self) -> Mechanism:
         """The mechanism that comes of it."""
-        return self.handling.applied(of_table(self.table, self.frames, self.backwards))
+        return asked(of_table(self.table, self.frames, self.backwards), self.P)
 
 
 @dataclass(frozen=True)
@@ -74,16 +50,16 @@ class UrdfRecipe:
     model_joints: tuple[str, ...]
     prismatic: tuple[bool, ...]
     reading: Reading = SPECIFIED
-    handling: Handling = field(default_factory=Handling)
+    P: Array | None = None
     gauge: bool = False
 
     @cached_property
     def mechanism(self) -> Mechanism:
         """The mechanism that comes of it."""
-        return self.handling.applied(self.bare(self.base, self.frames))
+        return asked(self.bare(self.base, self.frames), self.P)
 
     def bare(self, base: str, frames: Mapping[str, str]) -> Mechanism:
-        """The mechanism without handling, for other links."""
+        """The mechanism asked at q itself, for other links."""
         return of_urdf(self.urdf, base, frames, self.joints, self.model_joints, self.prismatic, self.reading, self.gauge)
 
     def with_joint(self, name: str, **changes: object) -> UrdfRecipe:
@@ -93,3 +69,8 @@ class UrdfRecipe:
 
 
 Recipe: TypeAlias = TableRecipe | UrdfRecipe
+
+
+def mixed(recipe: Recipe, P: Array) -> Recipe:
+    """The recipe, taking P q for q first."""
+    return replace(recipe, P=P if recipe.P is None else recipe.P @ P)

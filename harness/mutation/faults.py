@@ -16,6 +16,7 @@ from harness.description.dh import DHRow
 from harness.description.model import RobotModel
 from harness.mutation.mutant import Cause, Fault, Mutant, with_frames, with_row, with_rows
 from harness.mutation.numbers import with_urdf
+from harness.se3 import Array
 
 OFFSETS = ((math.pi / 2, "pi/2"), (math.radians(1.0), "1 deg"))
 
@@ -147,7 +148,7 @@ def of_tool(model: RobotModel) -> Iterator[Mutant]:
     table, last = model.table, model.table.rows[-1]
     if not np.array_equal(table.tool, np.eye(4)):
         missing = with_rows(model, table.rows, tool=np.eye(4))
-        yield Mutant("tool missing", "table", "tool missing", missing, (Cause("tool left out"),))
+        yield Mutant("tool missing", "table", "tool missing", missing, (Cause("tool left out"), *_alone(table.tool)))
     elif last.kind == "fixed" and last.d:
         mutated = with_row(model, len(table.rows) - 1, d=0.0)
         yield Mutant("tool missing", "table", "tool missing", mutated, (Cause("parameter", last.name, "d", last.d),))
@@ -156,6 +157,14 @@ def of_tool(model: RobotModel) -> Iterator[Mutant]:
         frames = [replace(f, dh="tool") if f.dh == label else f for f in model.frames.frames]
         longer = with_frames(with_rows(model, table.rows, tool=se3.translation((0.0, 0.0, 0.15))), frames)
         yield Mutant("a tool of 150 mm on one side", "table", "tool missing", longer, (Cause("tool left out"),))
+
+
+def _alone(tool: Array) -> list[Cause]:
+    """The one number of a tool that is a move along, or a turn about, one axis: naming it names the tool."""
+    roll, pitch, yaw = se3.to_rpy(tool)
+    moves = [("move x", tool[0, 3]), ("move y", tool[1, 3]), ("move z", tool[2, 3])]
+    numbers = [(name, float(x)) for name, x in (*moves, ("turn x", roll), ("turn y", pitch), ("turn z", yaw)) if x]
+    return [Cause("parameter", "tool", name, x) for name, x in numbers] if len(numbers) == 1 else []
 
 
 def of_controllers(model: RobotModel) -> Iterator[Mutant]:
