@@ -6,21 +6,15 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from harness.mutation.mutant import Mutant
+from harness.report.parts import Part
 from harness.report.text import plain
 
 Outcome = Literal["caught", "missed", "below the floor", "left alone", "false alarm", "refused", ""]
-
-
-class Part(BaseModel):
-    """Base of all parts: immutable, no unknown keys."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Trial(Part):

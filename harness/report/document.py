@@ -5,20 +5,12 @@ Units are metres and radians. Everything that varies between two equal runs (tim
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
-
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Configuration = list[Finite]
-Matrix = list[list[Finite]]
-
-
-class Part(BaseModel):
-    """Base of all parts: immutable, no unknown keys."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
+from harness.report.explanation import Change as Change
+from harness.report.explanation import Explanation as Explanation
+from harness.report.explanation import OneChange as OneChange
+from harness.report.parts import Configuration, Finite, Matrix, NonNegative, Part
 
 
 class At(Part):
@@ -132,40 +124,6 @@ class Certificate(Part):
     reference_residual: NonNegative | None = None
     limit: NonNegative | None = None
     frames: list[FrameBound] = []
-
-
-class OneChange(Part):
-    """One change, in words. kind: `parameter` for a number, which is then changed by `size` [m or rad]; else a name of the
-    catalogue. side: a, the reference's description; b, the source's; between, the mapping; source, what the source does."""
-
-    text: str
-    kind: str
-    side: Literal["a", "b", "between", "source"]
-    subject: str = ""
-    parameter: str = ""
-    size: Finite = 0.0
-    unit: Literal["m", "rad", ""] = ""
-
-
-class Change(OneChange):
-    """One change of a repair; equivalents: others that do the same in its place."""
-
-    equivalents: list[OneChange] = []
-
-
-class Explanation(Part):
-    """Why a source disagrees: a repair that was made to one side, compared again, and left no more than `after`.
-
-    Errors are the largest over all frames at the configurations it was tried at. No changes: no repair was found, and
-    `unexplained` says where the two part.
-    """
-
-    changes: list[Change] = []
-    unexplained: str = ""
-    before_position: NonNegative = 0.0
-    before_rotation: NonNegative = 0.0
-    after_position: NonNegative = 0.0
-    after_rotation: NonNegative = 0.0
 
 
 class Source(Part):
