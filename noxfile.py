@@ -53,6 +53,13 @@ def tests(session: nox.Session) -> None:
 
 
 @nox.session
+def mutate(session: nox.Session) -> None:
+    """How good the gate is: faults put into all robots on purpose, caught or not, and their causes named or not."""
+    session.install(CONSTRAINTS, f"pin=={NEWEST_PIN}", ".[all]")
+    session.run("crosscheck", "mutate", "--out", "reports", *session.posargs)
+
+
+@nox.session
 def engines(session: nox.Session) -> None:
     """Every engine there is, in its own environment: install them, try each case by case, cross-check all robots."""
     session.install(CONSTRAINTS, f"pin=={NEWEST_PIN}", "--editable", ".[all,test]")

@@ -16,6 +16,7 @@ from harness.engines.base import Trait
 from harness.engines.registry import adapter_of
 from harness.errors import CrosscheckError
 from harness.report import document as doc
+from harness.report import explanation as reasons
 from harness.results import Explained, Results
 from harness.sources import Participant, cause_on_file, deviation_on_file, pair_tolerance
 
@@ -258,19 +259,19 @@ def _finite(x: float) -> float | None:
 
 
 def _change(change: Change) -> dict[str, Any]:
-    return {field: getattr(change, field) for field in doc.OneChange.model_fields}
+    return {field: getattr(change, field) for field in reasons.OneChange.model_fields}
 
 
-def explanation(explained: Explained | None) -> doc.Explanation | None:
+def explanation(explained: Explained | None) -> reasons.Explanation | None:
     """The report entry of an explanation."""
     if explained is None or explained.explanation is None:
-        return None if explained is None else doc.Explanation(unexplained=explained.unexplained)
+        return None if explained is None else reasons.Explanation(unexplained=explained.unexplained)
     found = explained.explanation
     changes = [
-        doc.Change(**_change(change), equivalents=[doc.OneChange(**_change(other)) for other in others])
+        reasons.Change(**_change(change), equivalents=[reasons.OneChange(**_change(other)) for other in others])
         for change, others in zip(found.changes, found.equivalents, strict=True)
     ]
-    return doc.Explanation(
+    return reasons.Explanation(
         changes=changes,
         before_position=found.before[0],
         before_rotation=found.before[1],

@@ -23,6 +23,7 @@ from harness.mutation.mutant import Mutant, with_row
 from harness.mutation.trial import mutants_of
 from harness.options import Options
 from harness.report import document as doc
+from harness.report import explanation as reasons
 from harness.report.html import render_html
 from harness.report.junit import render_junit
 from harness.report.markdown import render_markdown
@@ -33,7 +34,7 @@ from tests.helpers import crosscheck
 PINOCCHIO = "urdf:pinocchio"
 
 
-def why(model: RobotModel, engine: Engine | None = None) -> tuple[doc.Explanation, doc.Source]:
+def why(model: RobotModel, engine: Engine | None = None) -> tuple[reasons.Explanation, doc.Source]:
     """The explanation of a run against Pinocchio's URDF."""
     report = crosscheck(model, Options(200, 0, (PINOCCHIO,), certify=False))
     source = report.sources[-1]
@@ -41,7 +42,7 @@ def why(model: RobotModel, engine: Engine | None = None) -> tuple[doc.Explanatio
     return source.explanation, source
 
 
-def said(explanation: doc.Explanation) -> list[set[tuple[str, str, str]]]:
+def said(explanation: reasons.Explanation) -> list[set[tuple[str, str, str]]]:
     """(kind, subject, parameter) of each change and of what is the same."""
     return [{(c.kind, c.subject, c.parameter) for c in (change, *change.equivalents)} for change in explanation.changes]
 

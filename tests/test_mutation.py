@@ -17,7 +17,8 @@ from harness.mutation.controller import FaultyWorkers
 from harness.mutation.mutant import Cause, Mutant
 from harness.mutation.score import MutationScore, Trial, score
 from harness.mutation.trial import mutants_of, try_out
-from harness.report.document import OneChange, Report
+from harness.report.document import Report
+from harness.report.explanation import OneChange
 from tests.conftest import WITHOUT
 
 PINOCCHIO, FLOAT32 = "urdf:pinocchio", "urdf:pytorch-kinematics"

@@ -40,7 +40,7 @@ def test_the_example_prints_what_it_shows(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "models" / "ur3", tmp_path / "models" / "ur3")
     commands = [line[2:] for line in block.splitlines() if line.startswith("$ ")]
     shown = [line.rstrip() for line in block.splitlines() if not line.startswith("$ ")]
-    assert len(shown) <= 10
+    assert len(shown) <= 12
     script = "\n".join(commands).replace("crosscheck run", f'"{sys.executable}" -m harness run')
     env = {k: v for k, v in os.environ.items() if k != "FORCE_COLOR"}
     result = subprocess.run(
@@ -51,12 +51,12 @@ def test_the_example_prints_what_it_shows(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "command", ["run", "frames", "engines", "worker-check", "render", "completion", "derive-dh", "export-urdf"]
+    "command", ["run", "frames", "engines", "worker-check", "render", "completion", "derive-dh", "export-urdf", "diff", "identify", "mutate"]
 )
 def test_every_command_is_shown(command: str) -> None:
     assert command in cli.commands
     assert f"crosscheck {command}" in README
-    assert len(cli.commands) == 8
+    assert len(cli.commands) == 11
 
 
 def test_every_source_and_robot_is_listed() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from harness.description.dh import DHRow
 from harness.description.frames import FrameMap, MappedFrame
 from harness.description.model import RobotModel
-from harness.report.document import OneChange
+from harness.report.explanation import OneChange
 from harness.se3 import Array
 
 Fault: TypeAlias = Literal["", "degrees", "inverse", "reversed", "mimic ignored"]

@@ -20,7 +20,7 @@ from harness.mutation.mutant import Mutant
 from harness.mutation.score import MutationScore, Trial, score
 from harness.mutation.trial import SAMPLES, mutants_of, try_out
 from harness.options import Options
-from harness.report.document import Change
+from harness.report.explanation import Change
 
 SOURCES = ("urdf:pinocchio", "urdf:pytorch-kinematics")
 CHUNK = 12

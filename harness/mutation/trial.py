@@ -18,6 +18,7 @@ from harness.mutation.score import Trial
 from harness.mutation.structure import of_axes, of_frames
 from harness.options import Options
 from harness.report import document as doc
+from harness.report import explanation as reasons
 from harness.sources import deviation_on_file
 
 SAMPLES = 200
@@ -32,7 +33,7 @@ def mutants_of(model: RobotModel) -> Iterator[Mutant]:
 
 
 def try_out(
-    mutant: Mutant, original: RobotModel, sources: Sequence[str], workers: FaultyWorkers, known: Sequence[doc.Change]
+    mutant: Mutant, original: RobotModel, sources: Sequence[str], workers: FaultyWorkers, known: Sequence[reasons.Change]
 ) -> list[Trial]:
     """Cross-check the mutant; one trial for each source. known: what explains the original."""
     named = (NAMES[mutant.fault],) if mutant.fault else (*sources, *(s for s in mutant.extra if s not in sources))
@@ -51,7 +52,7 @@ def try_out(
     return [_judged(mutant, original, by_name[source], effect_of(mutant, original, source), known) for source in named]
 
 
-def _judged(mutant: Mutant, original: RobotModel, source: doc.Source, effect: Effect, known: Sequence[doc.Change]) -> Trial:
+def _judged(mutant: Mutant, original: RobotModel, source: doc.Source, effect: Effect, known: Sequence[reasons.Change]) -> Trial:
     trial = Trial.of(mutant, original.name, source.name, "", "")
     largest = float(max(effect.position_change.max(initial=0.0), effect.rotation_change.max(initial=0.0)))
     trial = trial.model_copy(update={"effect": largest})
@@ -86,7 +87,7 @@ def _floor(effect: Effect, original: RobotModel, source: doc.Source) -> str | No
     return f"within the margin of an accepted deviation, and {floor}" if hidden else floor
 
 
-def _cause(mutant: Mutant, source: doc.Source, known: Sequence[doc.Change]) -> tuple[str, bool]:
+def _cause(mutant: Mutant, source: doc.Source, known: Sequence[reasons.Change]) -> tuple[str, bool]:
     """What was told, and whether the first group names the cause, with joint and size, and nothing beside what was known."""
     found = source.explanation
     if found is None or not found.changes:

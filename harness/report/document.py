@@ -7,9 +7,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from harness.report.explanation import Change as Change
-from harness.report.explanation import Explanation as Explanation
-from harness.report.explanation import OneChange as OneChange
+from harness.report.explanation import Explanation
 from harness.report.parts import Configuration, Finite, Matrix, NonNegative, Part
 
 
