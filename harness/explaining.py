@@ -10,7 +10,7 @@ import numpy as np
 from harness.analysis import fit
 from harness.analysis.changes import Change
 from harness.analysis.descriptions import X_AXIS, Z_AXIS, Reading
-from harness.analysis.explain import explain
+from harness.analysis.explain import explain, shown
 from harness.analysis.first_difference import first_difference
 from harness.analysis.problem import FAITHFUL, Problem, Seen, State
 from harness.analysis.recipes import Recipe, TableRecipe, UrdfRecipe
@@ -150,5 +150,5 @@ def _of_another(known: Explained, one: Problem, other: Problem) -> Explained | N
         return replace(change, text=change.text.replace(old, new))
 
     changes, others = tuple(map(named, e.changes)), tuple(tuple(map(named, slot)) for slot in e.equivalents)
-    before = State.start(other).errors()
+    before = shown(State.start(other))
     return Explained(replace(e, changes=changes, equivalents=others, before=before, after=left))

@@ -51,7 +51,20 @@ def test_the_example_prints_what_it_shows(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "command", ["run", "frames", "engines", "worker-check", "render", "completion", "derive-dh", "export-urdf", "diff", "identify", "mutate"]
+    "command",
+    [
+        "run",
+        "frames",
+        "engines",
+        "worker-check",
+        "render",
+        "completion",
+        "derive-dh",
+        "export-urdf",
+        "diff",
+        "identify",
+        "mutate",
+    ],
 )
 def test_every_command_is_shown(command: str) -> None:
     assert command in cli.commands

@@ -217,7 +217,13 @@ def _told(start: State, found: State) -> Explanation:
             said.update({c.key: c for s in alike for c in s.changes() if c.key not in kept and c.key != own.key})
         slots.append(tuple(sorted(said.values(), key=lambda c: c.rank)))
     slots.sort(key=lambda slot: slot[0].rank)
-    return Explanation(tuple(s[0] for s in slots), tuple(s[1:] for s in slots), start.errors(), found.errors())
+    return Explanation(tuple(s[0] for s in slots), tuple(s[1:] for s in slots), shown(start), found.errors())
+
+
+def shown(start: State) -> tuple[float, float]:
+    """Largest discrepancy [m], [rad] of the frames whose offset is known: a measured one would spread it over all q."""
+    T_a, T_b = (T[:, start.problem.fitted] for T in start.now)
+    return fit.errors(T_a, T_b)
 
 
 def _without(start: State, found: State, change: Change) -> State | None:
