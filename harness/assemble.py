@@ -7,6 +7,7 @@ from datetime import datetime, timezone
 
 from harness import __version__, se3
 from harness.analysis.verdict import check_claim
+from harness.assemble_model import side_by_side, trees
 from harness.assemble_source import assemble_source
 from harness.description.configurations import Configuration
 from harness.description.published import Published
@@ -31,6 +32,8 @@ def assemble(results: Results) -> doc.Report:
         sources=sources,
         frames=_frames(results),
         unmapped=_unmapped(results),
+        trees=trees(results.model),
+        parameters=side_by_side(results),
         pairs=_pairs(results),
         published=published,
         lint=_lint(results),

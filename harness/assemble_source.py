@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-import math
-from typing import Any
+import contextlib
 
 from harness.analysis.changes import Change
 from harness.analysis.compare import Comparison
-from harness.analysis.noise import NoiseClass, classify
+from harness.analysis.noise import CLASSES, NoiseClass, classify
 from harness.analysis.statistics import Stream
 from harness.analysis.verdict import FAILING, judge
+from harness.assemble_evidence import at, certificate, explanation, pose, reproducer
 from harness.binding import Bound
-from harness.description.configurations import ConfigurationSet
 from harness.engines.base import Trait
 from harness.engines.registry import adapter_of
-from harness.errors import CrosscheckError
+from harness.errors import CrosscheckError, EngineUnavailable, InputError
 from harness.report import document as doc
-from harness.report import explanation as reasons
-from harness.results import Explained, Results
+from harness.report import source_parts as parts
+from harness.results import Results
 from harness.sources import Participant, cause_on_file, deviation_on_file, pair_tolerance
+
+FLOAT64 = CLASSES[0]
 
 
 def assemble_source(results: Results, participant: Participant) -> doc.Source:
@@ -34,7 +35,8 @@ def assemble_source(results: Results, participant: Participant) -> doc.Source:
         verdict="failed" if participant.status == "failed" else "not run",
         reason=participant.reason,
         install=participant.install,
-        tolerance=doc.Tolerance(position=tolerance[0], rotation=tolerance[1]),
+        tolerance=parts.Tolerance(position=tolerance[0], rotation=tolerance[1]),
+        floor=_floor(results, (planned.name, reference.name)),
         traits=_traits(results, planned.name),
     )
     if bound is None:
@@ -50,14 +52,24 @@ def assemble_source(results: Results, participant: Participant) -> doc.Source:
     return _judged(results, results.comparison, participant, bound, part)
 
 
+def _floor(results: Results, names: tuple[str, str]) -> float:
+    """What rounding alone may change, in float64 or in what an engine computes in, if that is coarser [m, rad]."""
+    reach = results.comparison.reach if results.comparison else 0.0
+    floor = FLOAT64.limit * (1.0 + reach)
+    for name in names:
+        with contextlib.suppress(EngineUnavailable, InputError):  # a program, or a broken adapter that says so itself
+            floor = max(floor, adapter_of(name).resolution)
+    return floor
+
+
 def _judged(results: Results, comparison: Comparison, participant: Participant, bound: Bound, part: doc.Source) -> doc.Source:
     """Add the frames, and the verdict that follows from them."""
     reference = results.participants[0]
     tolerance = pair_tolerance(participant.planned, reference.planned)
     ends = [end for end in (bound, reference.bound) if end is not None]
-    certificate = _certificate(results, participant.name)
+    proven = certificate(results, participant.name)
     frames = [
-        _frame(results, comparison, participant.name, reference.name, index, tolerance, certificate)
+        _frame(results, comparison, participant.name, reference.name, index, tolerance, proven)
         for index in range(len(results.model.frames.frames))
         if all(end.should_have(index) for end in ends)
     ]
@@ -80,15 +92,16 @@ def _judged(results: Results, comparison: Comparison, participant: Participant, 
             "noise_text": noise.text,
             "explained_by": _evidence(results, part.traits, noise),
             "explanation": explanation(results.explained.get(participant.name)),
-            "reproducer": _reproducer(results, participant.name),
-            "certificate": certificate,
+            "reproducer": reproducer(results, participant.name),
+            "pose": pose(results, participant.name),
+            "certificate": proven,
         }
     )
 
 
 def _by_cause(
-    results: Results, source: str, frames: list[doc.FrameResult], tolerance: tuple[float, float]
-) -> list[doc.FrameResult]:
+    results: Results, source: str, frames: list[parts.FrameResult], tolerance: tuple[float, float]
+) -> list[parts.FrameResult]:
     """Accepted frames whose deviation is of the size on file, but has another cause, or one more: changed."""
     on_file = cause_on_file(results.model, source, results.participants[0].name)
     if not on_file or not results.options.explain or all(f.verdict != "accepted" for f in frames):
@@ -121,14 +134,14 @@ def _frame(
     reference: str,
     index: int,
     tolerance: tuple[float, float],
-    certificate: doc.Certificate | None,
-) -> doc.FrameResult:
+    proven: parts.Certificate | None,
+) -> parts.FrameResult:
     frame = results.model.frames.frames[index]
     position = _statistics(results, comparison.position[source], index)
     rotation = _statistics(results, comparison.rotation[source], index)
     on_file = deviation_on_file(results.model, source, reference, frame.name)
     deviation = on_file[0] if on_file else None
-    bound = next((b for b in certificate.frames if b.frame == frame.name), None) if certificate else None
+    bound = next((b for b in proven.frames if b.frame == frame.name), None) if proven else None
     # What the certificate's search has found counts like what the samples have shown: both were evaluated.
     found = (
         max(position.max, bound.position_found if bound else 0.0),
@@ -137,22 +150,24 @@ def _frame(
     # A frame that was never compared cannot agree: not one finite pair of placements was seen.
     verdict = judge(*found, tolerance, deviation) if position.count else "not compared"
     if verdict == "agrees" and results.model.file.gate == "certified":
-        proven = bound is not None and bound.position_upper <= tolerance[0] and bound.rotation_upper <= tolerance[1]
-        verdict = "agrees" if proven else "not certified"
-    return doc.FrameResult(
+        holds = bound is not None and bound.position_upper <= tolerance[0] and bound.rotation_upper <= tolerance[1]
+        verdict = "agrees" if holds else "not certified"
+    return parts.FrameResult(
         frame=frame.name,
         verdict=verdict,
         position=position,
         rotation=rotation,
         noise=classify(position.max, rotation.max, comparison.reach).key,
         accepted=on_file
-        and doc.Accepted(position=on_file[0].position, rotation=on_file[0].rotation, within=on_file[0].within, reason=on_file[1]),
+        and parts.Accepted(
+            position=on_file[0].position, rotation=on_file[0].rotation, within=on_file[0].within, reason=on_file[1]
+        ),
     )
 
 
-def _statistics(results: Results, stream: Stream, index: int) -> doc.Statistics:
+def _statistics(results: Results, stream: Stream, index: int) -> parts.Statistics:
     count = int(stream.count[index])
-    return doc.Statistics(
+    return parts.Statistics(
         count=count,
         max=max(float(stream.max[index]), 0.0),
         mean=stream.mean(index),
@@ -164,15 +179,10 @@ def _statistics(results: Results, stream: Stream, index: int) -> doc.Statistics:
     )
 
 
-def at(configurations: ConfigurationSet, index: int, seed: int) -> doc.At:
-    """A configuration by its index, with its values."""
-    return doc.At(index=index, label=configurations.label(index), q=configurations.one(seed, index).tolist())
-
-
-def _validity(results: Results, comparison: Comparison, participant: Participant, bound: Bound) -> doc.Validity:
+def _validity(results: Results, comparison: Comparison, participant: Participant, bound: Bound) -> parts.Validity:
     seen = comparison.validity[participant.name]
     first = seen.first
-    return doc.Validity(
+    return parts.Validity(
         checked=seen.checked,
         invalid=seen.invalid,
         residual=seen.residual,
@@ -183,14 +193,14 @@ def _validity(results: Results, comparison: Comparison, participant: Participant
     )
 
 
-def _traits(results: Results, source: str) -> list[doc.TraitNote]:
+def _traits(results: Results, source: str) -> list[parts.TraitNote]:
     try:
         traits: tuple[Trait, ...] = adapter_of(source).traits
     except CrosscheckError:  # a broken adapter has none to show; its problem is the source's reason
         return []
     found = {finding.code for finding in results.model.findings}
     return [
-        doc.TraitNote(key=t.key, text=t.text, evidence=t.evidence, lint=t.lint or "", applies=t.lint is None or t.lint in found)
+        parts.TraitNote(key=t.key, text=t.text, evidence=t.evidence, lint=t.lint or "", applies=t.lint is None or t.lint in found)
         for t in traits
     ]
 
@@ -211,7 +221,7 @@ def _joint_notes(results: Results, bound: Bound) -> dict[str, object]:
     return {"held": held, "mimic": "; ".join(texts)}
 
 
-def _evidence(results: Results, traits: list[doc.TraitNote], noise: NoiseClass) -> list[str]:
+def _evidence(results: Results, traits: list[parts.TraitNote], noise: NoiseClass) -> list[str]:
     """What is known about this engine or this URDF that would make a discrepancy of this class."""
     evidence = [t.text for t in traits if t.applies and noise.key == "float32" and t.key.startswith("float32")]
     if noise.key.startswith("pi-"):
@@ -222,73 +232,3 @@ def _evidence(results: Results, traits: list[doc.TraitNote], noise: NoiseClass) 
     if noise.key == "model":
         evidence += [t.text for t in traits if t.applies and t.lint]
     return evidence
-
-
-def _certificate(results: Results, source: str) -> doc.Certificate | None:
-    certified = results.certified.get(source)
-    if certified is None:
-        return None
-    bounds, position, rotation = certified.bounds, certified.position_found, certified.rotation_found
-    frames = []
-    if bounds is not None and position is not None and rotation is not None:
-        frames = [
-            doc.FrameBound(
-                frame=results.model.frames.frames[index].name,
-                position_upper=float(bounds.position[i]),
-                position_found=float(position[i]),
-                rotation_upper=float(bounds.rotation[i]),
-                rotation_found=float(rotation[i]),
-                method=bounds.method[i],
-            )
-            for i, index in enumerate(certified.frames)
-        ]
-    return doc.Certificate(
-        status="certified" if frames else "refused",
-        reason=certified.reason,
-        form=certified.form,
-        nodes=certified.nodes,
-        residual=_finite(certified.residual),
-        reference_residual=_finite(certified.reference_residual),
-        limit=_finite(certified.limit),
-        frames=frames,
-    )
-
-
-def _finite(x: float) -> float | None:
-    return x if math.isfinite(x) else None
-
-
-def _change(change: Change) -> dict[str, Any]:
-    return {field: getattr(change, field) for field in reasons.OneChange.model_fields}
-
-
-def explanation(explained: Explained | None) -> reasons.Explanation | None:
-    """The report entry of an explanation."""
-    if explained is None or explained.explanation is None:
-        return None if explained is None else reasons.Explanation(unexplained=explained.unexplained)
-    found = explained.explanation
-    changes = [
-        reasons.Change(**_change(change), equivalents=[reasons.OneChange(**_change(other)) for other in others])
-        for change, others in zip(found.changes, found.equivalents, strict=True)
-    ]
-    return reasons.Explanation(
-        changes=changes,
-        before_position=found.before[0],
-        before_rotation=found.before[1],
-        after_position=found.after[0],
-        after_rotation=found.after[1],
-    )
-
-
-def _reproducer(results: Results, source: str) -> doc.Reproducer | None:
-    found = results.reproduced.get(source)
-    if found is None:
-        return None
-    return doc.Reproducer(
-        frame=results.model.frames.frames[found.frame].name,
-        q=found.q.tolist(),
-        position=found.position,
-        rotation=found.rotation,
-        reference_placement=found.T_reference.tolist(),
-        source_placement=found.T_source.tolist(),
-    )

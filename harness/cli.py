@@ -10,11 +10,13 @@ import click
 from click.shell_completion import get_completion_class
 
 from harness import __version__
+from harness.cli_accept import accept
 from harness.cli_derive import derive_dh, export_urdf_command
 from harness.cli_diff import diff_command, identify_command
 from harness.cli_engines import engines, worker_check
 from harness.cli_mutate import mutate
 from harness.cli_run import complete_robots, models_option, run
+from harness.cli_view import view
 from harness.console import complain, console
 from harness.description.locate import default_models_dir
 from harness.errors import CrosscheckError, InputError
@@ -62,7 +64,7 @@ def completion(shell: str) -> int:
     return 0
 
 
-for command in (run, engines, worker_check, derive_dh, export_urdf_command, diff_command, identify_command, mutate):
+for command in (run, accept, view, engines, worker_check, derive_dh, export_urdf_command, diff_command, identify_command, mutate):
     cli.add_command(command)
 
 

@@ -16,11 +16,12 @@ from harness.cli_run import complete_robots, models_option
 from harness.console import console
 from harness.description.dh import Convention
 from harness.description.locate import default_models_dir
-from harness.differences import Diff, diff, remarks, turned
+from harness.differences import Diff, diff, remarks
 from harness.errors import InputError
 from harness.identify import identify
 from harness.operands import read_operand
 from harness.report.text import metres, plain, radians
+from harness.side_by_side import turned
 
 CHANGED = 1e-9
 ALIKE = 1e-3

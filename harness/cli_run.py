@@ -21,9 +21,10 @@ from harness.engines.process import Limits
 from harness.engines.registry import REFERENCE, registered
 from harness.errors import CrosscheckError, InputError
 from harness.options import Options
+from harness.report.accepted import FOLDER, AcceptedNumbers, compared, read_accepted
 from harness.report.document import Report
 from harness.report.engine_table import show_engine_table
-from harness.report.files import prepare, write_index, write_report
+from harness.report.files import prepare, write_index, write_report, write_summary
 from harness.report.terminal import show
 from harness.report.text import plain
 
@@ -62,6 +63,14 @@ models_option = click.option(
     help="Folder of robot models.  [default: the models that come with the package]",
 )
 
+accepted_option = click.option(
+    "--accepted",
+    type=click.Path(path_type=Path),
+    default=Path("reports") / FOLDER,
+    show_default=True,
+    help="Folder of the accepted numbers.",
+)
+
 
 @click.command()
 @click.argument("robots", nargs=-1, metavar="[ROBOT]...", shell_complete=complete_robots)
@@ -96,6 +105,8 @@ models_option = click.option(
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("reports"), show_default=True, help="Folder for the reports."
 )
+@accepted_option
+@click.option("--strict", is_flag=True, help="Fail if a discrepancy grew since it was accepted, by more than the noise floor.")
 @click.option("--jobs", type=int, default=0, help="Engines that compute at a time.  [default: one a core]")
 @click.option("--start-timeout", type=float, default=Limits.start, show_default=True, help="Seconds for an engine to start.")
 @click.option("--block-timeout", type=float, default=Limits.block, show_default=True, help="Seconds for 4096 configurations.")
@@ -115,6 +126,8 @@ def run(
     explain: bool,
     seed: int,
     out: Path,
+    accepted: Path,
+    strict: bool,
     jobs: int,
     start_timeout: float,
     block_timeout: float,
@@ -142,9 +155,12 @@ def run(
                 if model.name in names:
                     raise InputError(f"robot name {model.name!r} is also that of {names[model.name]}", where=folder)
                 names[model.name] = folder
+                on_file = _on_file(accepted / f"{model.name}.json", strict)
                 with progress_bar(model.name, quiet or as_json) as advance:
                     report = crosscheck(model, options.reproduced_by(_command(folder, models, options)), advance, workshop)
+                report = report if on_file is None else compared(report, on_file, strict)
                 write_report(report, out)
+                write_summary(report)
                 _tell(report, quiet, as_json)
                 reports.append(report)
                 codes.append(report.verdict.exit_code)
@@ -164,6 +180,11 @@ def folders_of(robots: tuple[str, ...], models: Path) -> list[Path]:
     if not robots:
         return list(model_folders(models).values())
     return list(dict.fromkeys(find_model(robot, models) for robot in robots))
+
+
+def _on_file(path: Path, strict: bool) -> AcceptedNumbers | None:
+    """The accepted numbers, before any work is done. Raises InputError if they are wrong, or not there and `strict`."""
+    return read_accepted(path) if strict or path.exists() else None
 
 
 def _command(folder: Path, models: Path | None, options: Options) -> str:

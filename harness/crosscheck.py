@@ -24,6 +24,7 @@ from harness.engines.workers import Workers
 from harness.errors import EngineFailed
 from harness.explaining import explain_all
 from harness.options import Options
+from harness.poses import pose_all
 from harness.report.document import Report
 from harness.results import Reproduced, Results
 from harness.se3 import Array, position_error, rotation_error
@@ -43,11 +44,12 @@ def crosscheck(model: RobotModel, options: Options, progress: Progress | None = 
     results = Results(model, options, participants)
     with contextlib.ExitStack() as stack:
         workers = workers or stack.enter_context(options.workshop())
-        _bind_all(results, workers)
+        bind_all(results, workers)
         results.loaded_in = time.perf_counter() - started
         results.comparison = compare(results, workers, progress)
         if results.comparison is not None:
             results.reproduced = _reproduce(results, results.comparison)
+            results.posed = pose_all(results)
             if options.explain:
                 results.explained = explain_all(results)
             if options.certify:
@@ -68,7 +70,7 @@ def _load(planned: Planned, model: RobotModel, workers: Workers) -> Engine:
     return workers.start(planned.name, command, greeting, planned.folder)
 
 
-def _bind_all(results: Results, workers: Workers) -> None:
+def bind_all(results: Results, workers: Workers) -> None:
     """Load every engine, measure each rigid offset, then bind for good.
 
     With the first URDF source that has the frame, or a later one in which the offset is nearer to constant, if it is not.
@@ -131,6 +133,7 @@ def _died(results: Results) -> None:
                 results.comparison.drop(participant.name)
             results.certified.pop(participant.name, None)
             results.reproduced.pop(participant.name, None)
+            results.posed.pop(participant.name, None)
             results.explained.pop(participant.name, None)
 
 

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from harness.analysis.align import chain_screws
-from harness.analysis.canonical import canonical
 from harness.analysis.certify import Sampled, certify, sample
 from harness.analysis.changes import GAUGE
 from harness.analysis.explain import Explanation, explain
@@ -19,23 +17,14 @@ from harness.analysis.invariants import Matching, match
 from harness.analysis.mechanism import Mechanism
 from harness.analysis.problem import Problem, Seen, State
 from harness.analysis.recipes import Recipe
-from harness.description.dh import Convention, DHRow
+from harness.description.dh import Convention
 from harness.operands import TIP, Operand, matched
 from harness.se3 import Array
+from harness.side_by_side import Side, canonical_side
 
 FITTED, CHECKED = 16, 48
 GRID = 4096
 SLIDE = 0.5  # m, range of prismatic joints
-
-
-@dataclass(frozen=True)
-class Side:
-    """One canonical table: rows, and base and tool transforms; empty if the chain has none, with the reason."""
-
-    rows: tuple[DHRow, ...]
-    base: Array
-    tool: Array
-    problem: str = ""
 
 
 @dataclass(frozen=True)
@@ -71,9 +60,9 @@ def diff(a: Operand, b: Operand, tolerance: tuple[float, float]) -> Diff:
     errors = [max(x) for x in zip(start.errors(), start.errors(problem.check), strict=True)]
     recipes = (problem.a, problem.b) if first is a else (problem.b, problem.a)
     convention: Convention = next((o.table.convention for o in (a, b) if o.table is not None), "standard")
-    tables = [_side(_mechanism(recipe), convention) for recipe in recipes]
+    tables = [canonical_side(_mechanism(recipe), convention, TIP) for recipe in recipes]
     # What is compared modulo base and tool is between the axes: standard rows say it for either convention.
-    standard = [_side(_mechanism(recipe), "standard").rows for recipe in recipes]
+    standard = [canonical_side(_mechanism(recipe), "standard", TIP).rows for recipe in recipes]
     matching = match(standard[0], standard[1]) if all(standard) else None
     bound = _bound(problem)
     return Diff(
@@ -105,18 +94,6 @@ def _configurations(prismatic: Sequence[bool]) -> Array:
     return np.concatenate([q, np.zeros((1, len(reach))), np.diag(np.where(prismatic, 0.1, 1.0))])
 
 
-def _side(mechanism: Mechanism, convention: Convention) -> Side:
-    """The canonical table of a mechanism, from n + 1 placements."""
-    n, prismatic = len(mechanism.joints), list(mechanism.prismatic)
-    q = np.concatenate([np.zeros((1, n)), np.diag(np.where(prismatic, 0.1, 1.0))])
-    screws = chain_screws(mechanism.placements(q, (TIP,))[:, 0], prismatic)
-    try:
-        form = canonical(screws, prismatic, convention, list(mechanism.joints))
-    except ValueError as error:
-        return Side((), np.eye(4), np.eye(4), str(error))
-    return Side(form.rows, form.base, form.tool)
-
-
 def _bound(problem: Problem) -> tuple[float, float] | None:
     """Proven for every angle (prismatic joints within half a metre); None for long chains and where joints are coupled."""
     mechanism = _mechanism(problem.a)
@@ -137,30 +114,6 @@ def _sampled(mechanism: Mechanism, axes: list[Axis]) -> Sampled:
         return np.ascontiguousarray(np.swapaxes(mechanism.placements(q, (TIP,))[:, :, :3, :], -1, -2))
 
     return sample(evaluate, axes, np.random.default_rng(0))
-
-
-def turned(a: Sequence[DHRow], b: Sequence[DHRow], convention: Convention) -> list[DHRow]:
-    """b's rows with each common normal turned as a's, where that is nearer: another table of the same mechanism.
-
-    Turning x_i negates a and alpha along it, and shifts theta before and after it by half a turn.
-    """
-    rows = list(b)
-    for i in range(len(rows) - 1):
-        along = i if convention == "standard" else i + 1
-        one, other = a[along], rows[along]
-        turns = [_apart(one.a, other.a * s) + abs(math.remainder(one.alpha - other.alpha * s, 2.0 * math.pi)) for s in (1, -1)]
-        if abs(turns[0] - turns[1]) < 1e-7:
-            gaps = [abs(math.remainder(a[i].theta - rows[i].theta - half, 2.0 * math.pi)) for half in (0.0, math.pi)]
-            turns = gaps if a[i].kind == "revolute" else [0.0, 1.0]
-        if turns[1] < turns[0] - 1e-7:
-            rows[along] = replace(other, a=-other.a, alpha=-other.alpha)
-            rows[i] = replace(rows[i], theta=rows[i].theta + math.pi)
-            rows[i + 1] = replace(rows[i + 1], theta=rows[i + 1].theta - math.pi)
-    return rows
-
-
-def _apart(x: float, y: float) -> float:
-    return abs(x - y)
 
 
 def remarks(found: Diff) -> list[str]:

@@ -40,7 +40,7 @@ def problem_of(
     recipes = []
     for bound, kind, T in zip((reference, source), kinds, (T_a, T_b), strict=True):
         packaged = bound.engine.takes == "packaged"
-        candidates = [] if packaged else list(_recipes(model, kind, names, offsets))
+        candidates = [] if packaged else list(recipes_of(model, kind, names, offsets))
         recipes.append(_faithful(candidates, q, names, T, tolerance))
     rigid = frozenset(f.name for f in frames if f.relation == "rigid") if kinds[0] != kinds[1] else frozenset()
     if kinds == ["dh", "dh"]:
@@ -64,7 +64,7 @@ def configurations(model: RobotModel) -> Array:
     return np.concatenate([q, np.zeros((1, len(law.lower))), steps])
 
 
-def _recipes(model: RobotModel, kind: str, names: tuple[str, ...], offsets: Mapping[str, Array]) -> Iterator[Recipe]:
+def recipes_of(model: RobotModel, kind: str, names: tuple[str, ...], offsets: Mapping[str, Array]) -> Iterator[Recipe]:
     """The description, in every way in which a source of this kind may read it."""
     frames = {f.name: f for f in model.frames.frames if f.name in names}
     if kind == "dh" or model.urdf is None or model.urdf_joints is None:

@@ -55,6 +55,15 @@ class Explained:
     unexplained: str = ""
 
 
+@dataclass(frozen=True)
+class Posed:
+    """The configuration where a source is furthest off, over its tolerance, and the frame; both placements of each common one."""
+
+    index: int
+    frame: int
+    placements: dict[int, tuple[Array, Array]]
+
+
 @dataclass
 class Results:
     """Everything a run found. `comparison` is None if the reference did not run; `in_house` is always there."""
@@ -67,6 +76,7 @@ class Results:
     in_house: Bound | None = None
     comparison: Comparison | None = None
     reproduced: dict[str, Reproduced] = field(default_factory=dict)
+    posed: dict[str, Posed] = field(default_factory=dict)
     certified: dict[str, Certified] = field(default_factory=dict)
     explained: dict[str, Explained] = field(default_factory=dict)
     seconds: float = 0.0

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -14,7 +14,7 @@ from hypothesis import settings
 
 from harness.description.locate import default_models_dir
 from harness.description.model import RobotModel, load_model
-from tests.helpers import shared_workers
+from tests.helpers import copied, shared_workers
 
 # In CI the same examples every time: a rare one found there would fail a change that did not cause it.
 settings.register_profile("default", deadline=None, max_examples=50, derandomize=bool(os.environ.get("CI")))
@@ -22,8 +22,6 @@ settings.load_profile("default")
 
 # Engines a run of the tests does without, said aloud by whoever runs them (nox -s matrix); any other must be installed.
 WITHOUT = set(filter(None, os.environ.get("CROSSCHECK_TESTS_WITHOUT", "").split(",")))
-
-Edit = tuple[str, str, str]
 
 
 def engines(*sources: str) -> list[object]:
@@ -35,20 +33,7 @@ def engines(*sources: str) -> list[object]:
 @pytest.fixture
 def copy_model(tmp_path: Path) -> Callable[..., Path]:
     """Copy one packaged model to a models/ folder, edited: (file, old text, new text) or (file, "", all of it)."""
-
-    def copy(robot: str, *edits: Edit) -> Path:
-        models, urdf = tmp_path / "models", tmp_path / "urdf"
-        shutil.copytree(default_models_dir() / robot, models / robot)
-        if not urdf.exists():
-            shutil.copytree(default_models_dir().parent / "urdf", urdf)
-        for name, old, new in edits:
-            path = urdf / name if name.endswith(".urdf") else models / robot / name
-            text = path.read_text()
-            assert old in text, f"{old!r} is not in {name}"
-            path.write_text(text.replace(old, new) if old else new)
-        return models / robot
-
-    return copy
+    return partial(copied, tmp_path)
 
 
 @pytest.fixture(scope="session", autouse=True)

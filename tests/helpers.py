@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import functools
 import math
+import shutil
+from pathlib import Path
 
 import numpy as np
 from hypothesis import strategies as st
@@ -11,11 +13,28 @@ from hypothesis import strategies as st
 from harness import crosscheck as module
 from harness import se3
 from harness.description.dh import DHRow, DHTable
+from harness.description.locate import default_models_dir
 from harness.description.model import RobotModel
 from harness.engines.workers import Workers
 from harness.options import Options
 from harness.report.document import Report
 from harness.se3 import Array
+
+Edit = tuple[str, str, str]
+
+
+def copied(folder: Path, robot: str, *edits: Edit) -> Path:
+    """A packaged model in folder/models, its URDF beside it, edited: (file, old text, new text) or (file, "", all of it)."""
+    models, urdf = folder / "models", folder / "urdf"
+    shutil.copytree(default_models_dir() / robot, models / robot)
+    if not urdf.exists():
+        shutil.copytree(default_models_dir().parent / "urdf", urdf)
+    for name, old, new in edits:
+        path = urdf / name if name.endswith(".urdf") else models / robot / name
+        text = path.read_text()
+        assert old in text, f"{old!r} is not in {name}"
+        path.write_text(text.replace(old, new) if old else new)
+    return models / robot
 
 
 @functools.cache

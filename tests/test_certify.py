@@ -23,7 +23,8 @@ from harness.engines.dh_numpy import DHNumpy
 from harness.engines.registry import Registered
 from harness.joint_axes import UncertifiableError, joint_axes
 from harness.options import Options
-from harness.report.document import Certificate, Report
+from harness.report.document import Report
+from harness.report.source_parts import Certificate
 from harness.se3 import Array, chord_angle
 from tests.helpers import crosscheck
 

@@ -19,11 +19,12 @@ from harness.derive import derive
 from harness.description.dh import DHRow, DHTable
 from harness.description.locate import default_models_dir, packaged_file
 from harness.description.model import RobotModel
-from harness.differences import Diff, diff, remarks, turned
+from harness.differences import Diff, diff, remarks
 from harness.engines.dh_numpy import DHNumpy
 from harness.errors import DescriptionUnavailable, InputError
 from harness.identify import identify, rows_of
 from harness.operands import Operand, read_operand
+from harness.side_by_side import turned
 from harness.write_model import dh_csv
 from tests.helpers import assert_placements_close, transforms
 

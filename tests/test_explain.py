@@ -28,8 +28,7 @@ from harness.report.html import render_html
 from harness.report.junit import render_junit
 from harness.report.markdown import render_markdown
 from harness.se3 import Array
-from tests.conftest import Edit
-from tests.helpers import crosscheck
+from tests.helpers import Edit, crosscheck
 
 PINOCCHIO = "urdf:pinocchio"
 

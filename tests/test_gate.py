@@ -20,8 +20,8 @@ from harness.options import Options
 from harness.report.document import Report, Source
 from harness.report.json_file import to_json
 from harness.se3 import Array
-from tests.conftest import WITHOUT, Edit
-from tests.helpers import crosscheck
+from tests.conftest import WITHOUT
+from tests.helpers import Edit, crosscheck
 
 FAST = ("dh:pinocchio", "urdf:pinocchio")
 

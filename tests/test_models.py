@@ -14,8 +14,7 @@ from harness.description.model import RobotModel, load_model
 from harness.errors import CrosscheckError, DescriptionUnavailable, InputError, ModelFileError
 from harness.options import Options
 from harness.sources import deviation_on_file, plan
-from tests.conftest import Edit
-from tests.helpers import crosscheck
+from tests.helpers import Edit, crosscheck
 
 NINE = ["humanoid_arm", "iiwa14", "panda", "sixr", "stanford", "ur10", "ur3", "ur5", "ur5e"]
 

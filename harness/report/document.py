@@ -8,127 +8,18 @@ from __future__ import annotations
 from typing import Literal
 
 from harness.report.explanation import Explanation
-from harness.report.parts import Configuration, Finite, Matrix, NonNegative, Part
-
-
-class At(Part):
-    """A configuration: its index (fixed first, then random), its name and q [rad or m]."""
-
-    index: int
-    label: str
-    q: Configuration
-
-
-class Statistics(Part):
-    """Of one discrepancy, over all configurations. Quantiles are upper bounds, at most 15.5 % high; `decades` counts
-    values by power of ten."""
-
-    count: int
-    max: NonNegative
-    mean: NonNegative
-    p50: NonNegative
-    p95: NonNegative
-    p99: NonNegative
-    decades: dict[str, int]
-    worst: At | None
-
-
-class Tolerance(Part):
-    """Largest discrepancy that counts as agreement."""
-
-    position: NonNegative
-    rotation: NonNegative
-
-
-class Accepted(Part):
-    """A deviation on file for this source and frame."""
-
-    position: NonNegative
-    rotation: NonNegative
-    within: NonNegative
-    reason: str
-
-
-class FrameResult(Part):
-    """One source at one mapped frame, against the reference."""
-
-    frame: str
-    verdict: Literal[
-        "agrees", "disagrees", "accepted", "deviation changed", "deviation vanished", "not compared", "not certified"
-    ]
-    position: Statistics
-    rotation: Statistics
-    noise: str
-    accepted: Accepted | None = None
-
-
-class Reproducer(Part):
-    """The worst configuration of a source, shrunk: joints set to zero while the frame still disagrees."""
-
-    frame: str
-    q: Configuration
-    position: NonNegative
-    rotation: NonNegative
-    reference_placement: Matrix
-    source_placement: Matrix
-
-
-class TraitNote(Part):
-    """A trait of an engine. `lint` is the URDF finding that makes it matter; `applies` says whether this URDF has it."""
-
-    key: str
-    text: str
-    evidence: str
-    lint: str
-    applies: bool
-
-
-class Validity(Part):
-    """Placements checked for being placements: finite, last row 0 0 0 1, rotation in SO(3); and for depending on q alone:
-    `again` is the largest change of an entry when a configuration, `again_at`, was asked for a second time."""
-
-    checked: int
-    invalid: int
-    residual: NonNegative
-    first: At | None = None
-    first_frame: str = ""
-    again: NonNegative = 0.0
-    again_at: At | None = None
-
-
-class FrameBound(Part):
-    """For every configuration: no discrepancy at this frame is above `upper`; `found` is the largest one seen."""
-
-    frame: str
-    position_upper: NonNegative
-    position_found: NonNegative
-    rotation_upper: NonNegative
-    rotation_found: NonNegative
-    method: str
-
-
-class Certificate(Part):
-    """Agreement for every angle of every revolute joint, and every prismatic joint within its range; or why there is none.
-
-    form: `grid` or `links`; nodes: configurations evaluated. residual, reference_residual: how far each engine is from the
-    interpolant of its own values at random configurations; limit: how far rounding explains.
-    """
-
-    status: Literal["certified", "refused"]
-    reason: str = ""
-    form: str = ""
-    nodes: int = 0
-    residual: NonNegative | None = None
-    reference_residual: NonNegative | None = None
-    limit: NonNegative | None = None
-    frames: list[FrameBound] = []
+from harness.report.model_parts import SideBySide, Trees
+from harness.report.parts import Finite, Matrix, NonNegative, Part
+from harness.report.pose import Pose
+from harness.report.regression import Regression
+from harness.report.source_parts import Certificate, FrameResult, Reproducer, Tolerance, TraitNote, Validity
 
 
 class Source(Part):
     """One source: whether it ran, what it was given, and how it compares.
 
     read_in: the frame its placements were read in, if it lacks the base frame; absent: mapped frames it does not have, and
-    was not compared at.
+    was not compared at. floor: what rounding alone may change in its discrepancies between two versions of a library [m, rad].
     """
 
     name: str
@@ -141,6 +32,7 @@ class Source(Part):
     reason: str = ""
     install: str = ""
     tolerance: Tolerance
+    floor: NonNegative = 0.0
     joints: list[str] = []
     mimic: str = ""
     held: list[str] = []
@@ -156,6 +48,7 @@ class Source(Part):
     explained_by: list[str] = []
     explanation: Explanation | None = None
     reproducer: Reproducer | None = None
+    pose: Pose | None = None
     certificate: Certificate | None = None
 
 
@@ -272,14 +165,17 @@ class Report(Part):
     """The whole document."""
 
     format: Literal["fk-crosscheck report"] = "fk-crosscheck report"
-    version: Literal["1.2"] = "1.2"
+    version: Literal["1.3"] = "1.3"
     robot: Robot
     settings: Settings
     verdict: Verdict
     sources: list[Source]
     frames: list[Frame]
     unmapped: list[str] = []
+    trees: Trees = Trees()
+    parameters: SideBySide | None = None
     pairs: list[PairResult]
     published: list[PublishedResult]
     lint: list[Lint]
+    regression: Regression | None = None
     environment: Environment

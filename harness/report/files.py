@@ -46,6 +46,18 @@ def write_rendered(report: Report, folder: Path) -> list[Path]:
     ]
 
 
+def write_summary(report: Report) -> None:
+    """Append the Markdown to the job's summary, if a CI server gives a file for it: $GITHUB_STEP_SUMMARY. Raises InputError."""
+    path = os.environ.get("GITHUB_STEP_SUMMARY")
+    if not path:
+        return
+    try:
+        with Path(path).open("a", encoding="utf-8") as file:
+            file.write(render_markdown(report) + "\n")
+    except OSError as error:
+        raise InputError(f"cannot be written: {error.strerror}", where=path, key="GITHUB_STEP_SUMMARY") from None
+
+
 def write_index(folder: Path) -> Path:
     """Write `index.html` over every report in `folder`, and the schema beside it. Raises InputError."""
     write(folder / SCHEMA_NAME, json.dumps(schema(), indent=2) + "\n")

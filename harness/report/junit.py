@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
-from harness.report.document import FrameResult, PublishedResult, Report, Source
+from harness.report.accepted import worsened
+from harness.report.document import PublishedResult, Report, Source
+from harness.report.regression import Regression
+from harness.report.source_parts import FrameResult
 from harness.report.text import metres, numbers, plain, radians, why
 
 
@@ -22,6 +25,8 @@ def render_junit(report: Report) -> str:
             suite.add_testcase(_invalid(report, source))
     for claim in report.published:
         suite.add_testcase(_published(report, claim))
+    if report.regression is not None and report.regression.strict:
+        suite.add_testcase(_regression(report, report.regression))
     xml = JUnitXml()
     xml.add_testsuite(suite)
     xml.update_statistics()  # type: ignore[no-untyped-call]
@@ -64,6 +69,16 @@ def _invalid(report: Report, source: Source) -> TestCase:
         v = source.validity
         again = f"; asked again, one changed by {v.again:.2g}"
         case.result = [Failure(f"{v.invalid} of {v.checked} are no rigid transforms{again}")]
+    return case
+
+
+def _regression(report: Report, found: Regression) -> TestCase:
+    """A strict run's own case: nothing grew since it was accepted."""
+    case = _case(report, f"nothing grew since {found.accepted}", "regression")
+    if lines := worsened(found):
+        failure = Failure(plain(lines[0]))
+        failure.text = "\n".join(plain(line) for line in [*lines, report.settings.command])
+        case.result = [failure]
     return case
 
 

@@ -5,14 +5,19 @@ from __future__ import annotations
 import re
 
 from harness.report.document import Report, Source
-from harness.report.text import for_all, metres, numbers, plain, radians, why
+from harness.report.text import difference, for_all, metres, moved_text, numbers, plain, radians, why
 
+_ENTITY = {"<": "&lt;", ">": "&gt;", "&": "&amp;"}
 MARK = {0: "PASS", 1: "FAIL", 3: "INCOMPLETE"}
-MAX_ROWS = 12
+# A screenful, whatever the report holds: at most 60 lines.
+SOURCES, CAUSES, OTHERS = 18, 12, 4
 
 
 def render_markdown(report: Report) -> str:
     """The report as Markdown text."""
+    compared = [source for source in report.sources if not source.reference]
+    passing = ("agrees", "agrees as accepted")
+    ranked = sorted(compared, key=lambda s: (s.verdict in passing, s.status != "ran" and not s.required))
     lines = [
         f"## {MARK[report.verdict.exit_code]}: {_md(report.robot.name)}",
         "",
@@ -23,11 +28,14 @@ def render_markdown(report: Report) -> str:
         "",
         "| source | verdict | worst frame | position | rotation | for all q | tolerance | size of |",
         "|---|---|---|---|---|---|---|---|",
-        *(_row(source) for source in report.sources if not source.reference),
+        *(_row(source) for source in ranked[:SOURCES]),
+        *([f"| and {len(ranked) - SOURCES} more in the HTML report | | | | | | | |"] if len(ranked) > SOURCES else []),
         "",
-        *_disagreements(report),
-        *_published(report),
-        *_not_run(report),
+        *_limited(_disagreements(report), CAUSES),
+        *_limited(_parameters(report), OTHERS),
+        *_limited(_published(report), OTHERS),
+        *_limited(_since(report), OTHERS),
+        *_limited(_not_run(report), OTHERS),
         f"Reproduce: {_code(report.settings.command)}",
     ]
     return "\n".join(lines) + "\n"
@@ -58,7 +66,36 @@ def _disagreements(report: Report) -> list[str]:
         lines += [f"  - {_md(text)}" for text in source.explained_by[:3]]
     accepted = {f.accepted.reason: f for s in report.sources for f in s.frames if f.verdict == "accepted" and f.accepted}
     lines += [f"- accepted: {_md(reason)} ({metres(f.position.max)})" for reason, f in accepted.items()]
-    return _limited(lines)
+    return lines
+
+
+def _parameters(report: Report) -> list[str]:
+    """The canonical numbers that differ."""
+    side = report.parameters
+    if side is None or side.problem:
+        return [] if side is None else [f"- canonical parameters: {_md(side.problem)}"]
+    marked = [p for p in side.rows if p.marked]
+    if not marked:
+        return [f"- canonical parameters: all {len(side.rows)} are the same in the table and in the URDF"]
+    told = [f"{p.parameter} of {p.subject} by {difference(p)}" for p in marked[:OTHERS]]
+    more = f"; and {len(marked) - OTHERS} more" if len(marked) > OTHERS else ""
+    return [f"- canonical parameters: {len(marked)} of {len(side.rows)} differ, URDF less table: {_md('; '.join(told))}{more}"]
+
+
+def _since(report: Report) -> list[str]:
+    """What moved since it was accepted."""
+    g = report.regression
+    if g is None:
+        return []
+    if g.problem:
+        return [f"- since {_md(g.accepted)}: not comparable, {_md(g.problem)}"]
+    if not g.moved and not g.changed:
+        return [f"- since {_md(g.accepted)}: nothing moved by more than the noise floor"]
+    counts = f"{len(g.grown)} numbers grew, {len(g.moved) - len(g.grown)} shrank, {len(g.changed)} things changed"
+    head = f"- since {_md(g.accepted)}: {counts}"
+    worst = sorted(g.moved, key=lambda m: m.before - m.after)
+    changed = [f"  - {_md(f'{c.what}: {c.before}, now {c.after}')}" for c in sorted(g.changed, key=lambda c: not c.worse)]
+    return [head, *changed[:1], *(f"  - {_md(moved_text(m))}" for m in worst), *changed[1:]]
 
 
 def _published(report: Report) -> list[str]:
@@ -78,29 +115,30 @@ def _published(report: Report) -> list[str]:
         for p in report.published
         if p.found == "holds" and p.status == "wrong"
     ]
-    return _limited(lines)
+    return lines
 
 
 def _not_run(report: Report) -> list[str]:
-    lines = [
+    return [
         f"- {s.status}: {_code(s.name)} {_md(s.reason)} {_code(s.install) if s.install else ''}".rstrip()
         for s in report.sources
         if s.status != "ran"
     ]
-    return _limited(lines)
 
 
-def _limited(lines: list[str]) -> list[str]:
-    """At most MAX_ROWS lines, saying how many were left out, and the blank line that ends a list."""
-    if len(lines) > MAX_ROWS:
-        lines = [*lines[:MAX_ROWS], f"- and {len(lines) - MAX_ROWS} more lines in the HTML report"]
+def _limited(lines: list[str], most: int) -> list[str]:
+    """At most `most` lines and one that says how many were left out, and the blank line that ends a list."""
+    if len(lines) > most + 1:
+        lines = [*lines[:most], f"- and {len(lines) - most} more lines in the HTML report"]
     return [*lines, ""] if lines else []
 
 
 def _md(text: str) -> str:
-    """Text whose letters mean nothing but themselves in Markdown and HTML."""
-    text = re.sub(r"([\\`*_{}\[\]()#+!|~$])", r"\\\1", plain(text))
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").replace("@", "&#64;").replace("://", ":&#47;/")
+    """Text whose letters mean nothing but themselves in Markdown and HTML, nor to GitHub and GitLab afterwards."""
+    text = re.sub(r"([\\`*_{}\[\]()#+!|~$<>&])", lambda found: _ENTITY.get(found[1], "\\" + found[1]), plain(text))
+    # Mentions and issue numbers are looked for in the finished page, where no escape is left: a space of no width is.
+    text = re.sub(r"@|#(?=\w)", lambda found: found[0] + "&#8203;", text)
+    return text.replace("://", ":&#47;/").replace("www.", "www&#46;")
 
 
 def _code(text: str) -> str:

@@ -7,11 +7,12 @@ from rich.table import Table
 from rich.text import Text
 
 from harness.report.document import Report, Source
-from harness.report.text import for_all, metres, numbers, plain, radians, why
+from harness.report.text import for_all, metres, moved_text, numbers, plain, radians, why
 
 _STYLE = {0: "bold green", 1: "bold red", 3: "bold yellow"}
 MAX_REASONS = 6
 MAX_WARNINGS = 4
+MAX_MOVED = 6
 _WORD = {0: "PASS", 1: "FAIL", 3: "INCOMPLETE"}
 
 
@@ -43,8 +44,29 @@ def show(report: Report, console: Console) -> None:
         console.print(Text(f"  {plain(finding.message)}", style="yellow"), soft_wrap=True)
     if (more := len(warnings) - MAX_WARNINGS) > 0:
         console.print(Text(f"  and {more} more warnings in the report", style="yellow"))
+    _since(report, console)
     if report.unmapped:
         console.print(Text(f"  not mapped, so not checked: {plain(', '.join(report.unmapped))}", style="yellow"), soft_wrap=True)
+
+
+def _since(report: Report, console: Console) -> None:
+    """What moved since it was accepted."""
+    g = report.regression
+    if g is None:
+        return
+    if g.problem:
+        console.print(Text(plain(f"  since {g.accepted}: not comparable, {g.problem}"), style="yellow"), soft_wrap=True)
+        return
+    if not g.moved and not g.changed:
+        console.print(Text(plain(f"  since {g.accepted}: nothing moved by more than the noise floor")), soft_wrap=True)
+    for moved in g.moved[:MAX_MOVED]:
+        style = "red" if moved.after > moved.before else ""
+        console.print(Text(plain(f"  since {g.accepted}: {moved_text(moved)}"), style=style), soft_wrap=True)
+    for change in g.changed[:MAX_MOVED]:
+        text = plain(f"  since {g.accepted}: {change.what}: {change.before}, now {change.after}")
+        console.print(Text(text, style="red" if change.worse else ""), soft_wrap=True)
+    if (more := max(0, len(g.moved) - MAX_MOVED) + max(0, len(g.changed) - MAX_MOVED)) > 0:
+        console.print(Text(f"  and {more} more changes in the report"))
 
 
 def _row(source: Source) -> tuple[Text, ...]:

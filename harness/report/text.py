@@ -7,6 +7,8 @@ import re
 from collections.abc import Iterable
 
 from harness.report.document import Source
+from harness.report.model_parts import ParameterPair
+from harness.report.regression import Moved
 
 MAX_SAME = 3
 
@@ -34,9 +36,42 @@ def radians(x: float) -> str:
     return f"{math.degrees(x):.3g} deg" if x >= 1e-4 else f"{x:.1e} rad"
 
 
+def quantity(x: float, unit: str) -> str:
+    """A length or an angle."""
+    return metres(x) if unit == "m" else radians(x)
+
+
+def change_of(pair: ParameterPair, value: float) -> str:
+    """A canonical number in mm or degrees, nine digits, rounding left off."""
+    scale = 1e3 if pair.unit == "m" else 180.0 / math.pi
+    return f"{round(value * scale, 6) + 0.0:.9g}"
+
+
+def difference(pair: ParameterPair) -> str:
+    """`-0.301 mm`, `+0.0002 deg`: what the URDF has more than the table."""
+    scale, unit = (1e3, "mm") if pair.unit == "m" else (180.0 / math.pi, "deg")
+    return f"{pair.difference * scale:+.6g} {unit}"
+
+
+def moved_text(moved: Moved) -> str:
+    """`urdf:pinocchio at tool0: position 1e-12 m, now 0.301 mm`."""
+    before, after = quantity(moved.before, moved.unit), quantity(moved.after, moved.unit)
+    return f"{moved.source} at {moved.frame}: {moved.quantity} {before}, now {after}"
+
+
 def numbers(values: Iterable[float], digits: int = 6) -> str:
     """`[0.2, -1.1, 0]`."""
     return "[" + ", ".join(f"{0.0 if v == 0 else v:.{digits}g}" for v in values) + "]"
+
+
+def point(values: Iterable[float]) -> str:
+    """A position [m] without what rounding leaves of a zero: `[0, -0.39225, 0]`."""
+    return numbers([round(v, 12) for v in values])
+
+
+def degrees(values: Iterable[float]) -> str:
+    """Angles in degrees: `[90, 0, 30]`."""
+    return numbers([round(math.degrees(v), 6) for v in values])
 
 
 def why(source: Source) -> list[str]:

@@ -1,0 +1,200 @@
+"""The numbers on file of one robot, `reports/accepted/<robot>.json`: taken from a report, and a later report compared with them.
+
+Small and sorted, to be reviewed like code: largest discrepancies and proven bounds by source and frame, verdicts, inputs.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Literal
+
+from pydantic import ValidationError
+
+from harness.errors import InputError
+from harness.report.document import Report, Source
+from harness.report.parts import NonNegative, Part
+from harness.report.regression import Changed, Moved, Regression
+from harness.report.text import moved_text
+
+FOLDER = "accepted"
+Pair = tuple[NonNegative, NonNegative]  # position [m], rotation [rad]
+BOUND = 50.0  # times the noise floor: a bound multiplies rounding by the Lebesgue constant of its grid, about 20 for six joints
+PASSING = ("reference", "agrees", "agrees as accepted")  # verdicts that pass
+
+
+class AcceptedSource(Part):
+    """One source: its verdict, the largest discrepancies at each frame, and the bounds proven there, if any."""
+
+    verdict: str
+    frames: dict[str, Pair] = {}
+    bounds: dict[str, Pair] = {}
+
+
+class AcceptedNumbers(Part):
+    """The whole file. What must be the same for numbers to be comparable is in `settings`."""
+
+    format: Literal["fk-crosscheck accepted"] = "fk-crosscheck accepted"
+    version: Literal["1.0"] = "1.0"
+    robot: str
+    accepted: str
+    verdict: str
+    settings: dict[str, str]
+    inputs: dict[str, str]
+    published: dict[str, str]
+    sources: dict[str, AcceptedSource]
+
+
+def accepted_from(report: Report) -> AcceptedNumbers:
+    """The numbers of a report, as they go on file."""
+    return AcceptedNumbers(
+        robot=report.robot.name,
+        accepted=report.environment.created[:10],
+        verdict=_gate(report),
+        settings=_settings(report),
+        inputs=dict(sorted(report.robot.hashes.items())),
+        published={f"{p.configuration}, DH frame {p.frame} in {p.relative_to}": p.found for p in report.published},
+        sources={s.name: _numbers(s) for s in report.sources if s.status == "ran" and not s.reference},
+    )
+
+
+def accepted_text(numbers: AcceptedNumbers) -> str:
+    """The file's text: JSON, a line a frame."""
+    text = json.dumps(numbers.model_dump(), indent=1, ensure_ascii=False)
+    # A pair of numbers belongs on one line, so that a changed frame is one changed line.
+    lines, out = text.split("\n"), []
+    while lines:
+        line = lines.pop(0)
+        if line.endswith("[") and len(lines) >= 3:
+            line += " ".join(lines.pop(0).strip() for _ in range(2)) + lines.pop(0).strip()
+        out.append(line)
+    return "\n".join(out) + "\n"
+
+
+def read_accepted(path: Path) -> AcceptedNumbers:
+    """Read the numbers on file. Raises InputError if there are none, or they cannot be read."""
+    try:
+        return AcceptedNumbers.model_validate_json(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError("nothing was accepted yet", where=path, hint=f"crosscheck accept {path.stem}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot be read: {getattr(error, 'strerror', None) or error}", where=path) from None
+    except ValidationError as failure:
+        first = failure.errors(include_url=False)[0]
+        key = ".".join(str(step) for step in first["loc"])
+        raise InputError(f"no accepted numbers: {first['msg']}", where=path, key=key or None) from None
+
+
+def since(numbers: AcceptedNumbers, report: Report, strict: bool) -> Regression:
+    """What moved from the numbers on file to this report."""
+    now = _settings(report)
+    other = [f"{k}: {numbers.settings.get(k)}, now {v}" for k, v in now.items() if numbers.settings.get(k) != v]
+    problem = f"accepted with other settings ({'; '.join(other)})" if other else ""
+    return Regression(
+        accepted=numbers.accepted,
+        problem=problem,
+        moved=[] if problem else list(_moved(numbers, report)),
+        changed=list(_changed(numbers, report)),
+        strict=strict,
+    )
+
+
+def compared(report: Report, numbers: AcceptedNumbers, strict: bool) -> Report:
+    """The report with what moved since; strict: it fails if anything did for the worse."""
+    found = since(numbers, report, strict)
+    report = report.model_copy(update={"regression": found})
+    if not strict or not found.worse:
+        return report
+    reasons = worsened(found)
+    old = report.verdict
+    sentence = old.sentence if old.exit_code == 1 else f"{report.robot.name} MOVED since it was accepted: {reasons[0]}"
+    verdict = old.model_copy(update={"exit_code": 1, "sentence": sentence, "reasons": [*old.reasons, *reasons]})
+    if old.exit_code != 1:
+        verdict = verdict.model_copy(update={"reasons": [*reasons, *old.reasons]})
+    return report.model_copy(update={"verdict": verdict})
+
+
+def worsened(found: Regression) -> list[str]:
+    """What a strict run fails for, a line each."""
+    lines = [found.problem] if found.problem else []
+    lines += [moved_text(m) for m in found.grown]
+    return lines + [f"{c.what}: {c.before}, now {c.after}" for c in found.changed if c.worse]
+
+
+def _gate(report: Report) -> str:
+    return {0: "passes", 1: "fails", 3: "incomplete"}[report.verdict.exit_code]
+
+
+def _settings(report: Report) -> dict[str, str]:
+    s = report.settings
+    return {"reference": s.reference, "fixed": str(s.fixed), "samples": str(s.samples), "seed": str(s.seed)}
+
+
+def _numbers(source: Source) -> AcceptedSource:
+    bounds, wide = source.certificate.frames if source.certificate else [], BOUND * source.floor
+    return AcceptedSource(
+        verdict=source.verdict,
+        frames={f.frame: (_kept(f.position.max, source.floor), _kept(f.rotation.max, source.floor)) for f in source.frames},
+        bounds={b.frame: (_kept(b.position_upper, wide), _kept(b.rotation_upper, wide)) for b in bounds},
+    )
+
+
+def _kept(x: float, floor: float) -> float:
+    """Ten digits; 0 below the noise floor, so that the file changes only where something did."""
+    return 0.0 if x <= floor else float(f"{x:.10g}")
+
+
+def _moved(numbers: AcceptedNumbers, report: Report) -> Iterator[Moved]:
+    for source in report.sources:
+        known = numbers.sources.get(source.name)
+        if known is None:
+            continue
+        new = _numbers(source)
+        for suffix, before, after in (("", known.frames, new.frames), (", for all q", known.bounds, new.bounds)):
+            floor = source.floor * (BOUND if suffix else 1.0)
+            for frame in (f for f in before if f in after):
+                for i, (quantity, unit) in enumerate((("position", "m"), ("rotation", "rad"))):
+                    a, b = before[frame][i], after[frame][i]
+                    if abs(b - a) > floor:
+                        yield Moved.model_validate(
+                            {"source": source.name, "frame": frame, "quantity": quantity + suffix, "unit": unit}
+                            | {"before": a, "after": b, "floor": floor}
+                        )
+
+
+def _changed(numbers: AcceptedNumbers, report: Report) -> Iterator[Changed]:
+    if numbers.verdict != (gate := _gate(report)):
+        yield Changed(what="the gate", before=numbers.verdict, after=gate, worse=gate != "passes")
+    for name, digest in report.robot.hashes.items():
+        if (before := numbers.inputs.get(name, "not there")) != digest:
+            yield Changed(what=name, before=before[:12], after=digest[:12])
+    for name in (name for name in numbers.inputs if name not in report.robot.hashes):
+        yield Changed(what=name, before=numbers.inputs[name][:12], after="not there")
+    yield from _sources_changed(numbers, report)
+    claims = {f"{p.configuration}, DH frame {p.frame} in {p.relative_to}": p for p in report.published}
+    for text, found in numbers.published.items():
+        if text in claims and claims[text].found != found:
+            worse = claims[text].found != claims[text].status
+            yield Changed(what=f"published placement {text}", before=found, after=claims[text].found, worse=worse)
+
+
+def _sources_changed(numbers: AcceptedNumbers, report: Report) -> Iterator[Changed]:
+    now = {s.name: s for s in report.sources if not s.reference}
+    for name, source in now.items():
+        known = numbers.sources.get(name)
+        if known is None:
+            if source.status == "ran":
+                yield Changed(what=name, before="not there", after=source.verdict, worse=source.verdict not in PASSING)
+            continue
+        if known.verdict != source.verdict:
+            yield Changed(what=name, before=known.verdict, after=source.verdict, worse=source.verdict not in PASSING)
+        # What is not compared any more is not seen to grow: that is worse than growing.
+        frames = {f.frame for f in source.frames}
+        for frame in (f for f in known.frames if f not in frames and source.status == "ran"):
+            yield Changed(what=f"{name} at {frame}", before="compared", after="not compared", worse=True)
+        proven = {b.frame for b in source.certificate.frames} if source.certificate else set()
+        if report.settings.certify and known.bounds and not proven and source.status == "ran":
+            yield Changed(what=f"certificate of {name}", before="certified", after="none", worse=True)
+    for name in (name for name in numbers.sources if name not in now):
+        yield Changed(what=name, before=numbers.sources[name].verdict, after="not there", worse=True)

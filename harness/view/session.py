@@ -1,0 +1,138 @@
+"""What a view shows, without the showing: the sources at one configuration, how far apart they are, and where to look."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from harness.analysis.singular import singular
+from harness.crosscheck import bind_all
+from harness.description.model import RobotModel
+from harness.engines.workers import Workers
+from harness.errors import EngineFailed
+from harness.options import Options
+from harness.poses import pose_all
+from harness.results import Results
+from harness.se3 import Array, position_error, rotation_error
+from harness.sources import Participant, pair_tolerance, plan
+from harness.streaming import compare
+
+
+@dataclass(frozen=True)
+class Apart:
+    """One source at one frame, off the reference [m], [rad]; within: no more than the tolerance."""
+
+    source: str
+    frame: str
+    position: float
+    rotation: float
+    within: bool
+
+
+@dataclass(frozen=True)
+class Place:
+    """A configuration to jump to: what it is, and q (n,)."""
+
+    kind: str
+    name: str
+    q: Array
+
+
+class Session:
+    """All chosen sources of a robot, bound as in a cross-check, asked one configuration at a time by any thread."""
+
+    def __init__(self, model: RobotModel, options: Options, workers: Workers) -> None:
+        """Start the engines and compare them once, to know where they are furthest apart.
+
+        Raises InputError for wrong options, EngineFailed if the reference does not run.
+        """
+        self.model, self.options = model, options
+        self.results = Results(model, options, [Participant(planned) for planned in plan(model, options)])
+        self._lock = threading.Lock()
+        bind_all(self.results, workers)
+        self.results.comparison = compare(self.results, workers, None)
+        reference = self.results.participants[0]
+        if reference.bound is None or self.results.comparison is None:
+            raise EngineFailed(reference.name, f"the reference does not run: {reference.reason}")
+        self.results.posed = pose_all(self.results)
+
+    @property
+    def reference(self) -> str:
+        """Name of the source that the others are compared with."""
+        return self.results.participants[0].name
+
+    @property
+    def sources(self) -> list[str]:
+        """Names of the sources that run, reference first."""
+        return [p.name for p in self.results.participants if p.bound is not None]
+
+    @property
+    def absent(self) -> dict[str, str]:
+        """Why each of the others does not run."""
+        return {p.name: p.reason for p in self.results.participants if p.bound is None}
+
+    @property
+    def frames(self) -> list[str]:
+        """Names of the mapped frames in the order of the chain."""
+        order = {label: i for i, label in enumerate(self.model.table.frames)}
+        return [f.name for f in sorted(self.model.frames.frames, key=lambda f: order[f.dh])]
+
+    def placements(self, q: Array) -> dict[str, dict[str, Array]]:
+        """Placements (4, 4) by source and frame at q (n,); a source that fails now is left out, and `absent` says why."""
+        names = [f.name for f in self.model.frames.frames]
+        found = {}
+        with self._lock:
+            for participant in self.results.participants:
+                if participant.bound is None:
+                    continue
+                try:
+                    T = participant.bound.mapped(q[None, :])
+                    found[participant.name] = {names[i]: placement[0] for i, placement in T.items()}
+                except Exception as error:  # an engine's failure is its result
+                    participant.fail(error)
+        return found
+
+    def apart(self, placements: Mapping[str, Mapping[str, Array]]) -> list[Apart]:
+        """Discrepancies from the reference, source by source, from the base on."""
+        reference = self.results.participants[0]
+        base = placements.get(reference.name, {})
+        rows = []
+        for participant in self.results.participants[1:]:
+            limits = pair_tolerance(participant.planned, reference.planned)
+            for frame in self.frames:
+                T_a, T_b = base.get(frame), placements.get(participant.name, {}).get(frame)
+                if T_a is None or T_b is None:
+                    continue
+                errors = (float(position_error(T_a, T_b)), float(rotation_error(T_a, T_b)))
+                within = all(e <= limit for e, limit in zip(errors, limits, strict=True))
+                rows.append(Apart(participant.name, frame, *errors, within))
+        return rows
+
+    @cached_property
+    def places(self) -> list[Place]:
+        """Published and named configurations, the worst of each source, and singular ones."""
+        law = self.model.configurations
+        places = [Place("published" if c.published else "fixed", c.name, c.q) for c in law.fixed]
+        places += [
+            Place("worst", f"{name} at {self.model.frames.frames[posed.frame].name}", law.one(self.options.seed, posed.index))
+            for name, posed in self.results.posed.items()
+        ]
+        for i, (q, value) in enumerate(self._singular()):
+            places.append(Place("singular", f"{i + 1}: smallest singular value {value:.1g}", q))
+        return places
+
+    def _singular(self) -> list[tuple[Array, float]]:
+        law, in_house = self.model.configurations, self.results.in_house
+        if in_house is None:
+            return []
+        last = max(in_house.view.available, key=lambda i: self.frames.index(self.model.frames.frames[i].name))
+        comparison = self.results.comparison
+        reach = comparison.reach if comparison else 1.0
+        with contextlib.suppress(np.linalg.LinAlgError):
+            return singular(lambda q: in_house.mapped(q)[last], law.lattice()[:512], law.lower, law.upper, max(reach, 1e-3))
+        return []
