@@ -1,4 +1,7 @@
-"""Every step of CI, to be run at home: `nox -s crosscheck`, `tests`, `engines`, `cpp`, `matrix`, `lint`, `types`, `bench`."""
+"""Every step of CI, to be run at home.
+
+`nox -s crosscheck`, `tests`, `browser`, `mutate`, `engines`, `cpp`, `matrix`, `lint`, `types`, `bench`.
+"""
 
 from __future__ import annotations
 
@@ -68,6 +71,21 @@ def engines(session: nox.Session) -> None:
     session.run("crosscheck", "engines", "install", "--all", CONSTRAINTS, success_codes=[0, 3])
     session.run("pytest", "-q", "tests/test_engines.py", env={"CROSSCHECK_TESTS_ENGINES": "all"})
     session.run("crosscheck", "run", "--all-engines", "--out", "reports", *session.posargs)
+
+
+@nox.session
+def browser(session: nox.Session) -> None:
+    """Reports and the view in a real browser: Chromium on the PATH, or the one that CHROMIUM names."""
+    chromium = (
+        os.environ.get("CHROMIUM")
+        or shutil.which("chromium")
+        or shutil.which("chromium-browser")
+        or shutil.which("google-chrome")
+    )
+    if chromium is None:
+        session.error("no Chromium found; install it (Debian: apt install chromium), or say where it is: CHROMIUM=...")
+    session.install(CONSTRAINTS, f"pin=={NEWEST_PIN}", "--editable", ".[pinocchio,yourdfpy,robots,view,browser,test]")
+    session.run("pytest", "tests/browser", *session.posargs, env={"CROSSCHECK_TESTS_BROWSER": str(chromium)})
 
 
 @nox.session

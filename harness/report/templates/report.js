@@ -94,6 +94,15 @@ async function figures() {
     byId("skeleton-magnified").addEventListener("change", redraw);
     // What turns under the mouse turns by keyboard as well.
     const steps = { left: [-0.2, 0, 1], right: [0.2, 0, 1], up: [0, 0.2, 1], down: [0, -0.2, 1], closer: [0, 0, 0.8], further: [0, 0, 1.25] };
+    // A link to a source shows that source.
+    const choose = () => {
+      const chosen = byId(decodeURIComponent(location.hash.slice(1)))?.dataset.pose;
+      if (!chosen) return;
+      byId("skeleton-source").value = chosen;
+      redraw().then(follow);
+    };
+    addEventListener("hashchange", choose);
+    choose();
     for (const button of document.querySelectorAll("[data-turn]")) button.addEventListener("click", () => turn(plot, ...steps[button.dataset.turn]));
     byId("skeleton-home").addEventListener("click", () => Plotly.relayout(plot, { "scene.camera": structuredClone(HOME) }));
     plot.on("plotly_relayout", () => (plot.dataset.eye = JSON.stringify(plot.layout.scene.camera.eye)));

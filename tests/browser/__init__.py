@@ -1,0 +1,1 @@
+"""Reports and the view as people use them: in a real browser."""

@@ -1,0 +1,122 @@
+"""`crosscheck view` in a browser: a slider is moved, the discrepancy shown follows."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+
+from harness.description.model import RobotModel, load_model
+from harness.engines.dh_numpy import DHNumpy
+from harness.report.text import metres
+from harness.se3 import position_error
+from tests.browser.conftest import BROWSER, Open, until
+from tests.helpers import copied
+
+
+@pytest.fixture(scope="module")
+def broken(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A UR5 whose forearm is twisted by 10 mrad: how far off the tool is depends on the joints after it."""
+    return copied(
+        tmp_path_factory.mktemp("view"),
+        "ur5",
+        ("dh.csv", "elbow_joint,revolute,-0.39225,0,", "elbow_joint,revolute,-0.39225,0.01,"),
+    )
+
+
+@pytest.fixture(scope="module")
+def served(broken: Path) -> Iterator[tuple[str, int]]:
+    """The address of a running view and the id of its process."""
+    command = [sys.executable, "-m", "harness", "view", str(broken), "--samples", "50", "--port", "8765"]
+    command += ["--source", "dh:pinocchio", "--source", "urdf:pinocchio"]
+    view = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)
+    try:
+        assert view.stdout is not None
+        line = view.stdout.readline()
+        found = re.search(r"http://127\.0\.0\.1:\d+", line)
+        assert found, line
+        yield found[0], view.pid
+        view.send_signal(signal.SIGINT)
+        assert view.wait(20) == 0
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(view.pid, signal.SIGKILL)
+        view.wait(10)
+        if view.stdout is not None:
+            view.stdout.close()
+
+
+def test_a_slider_moves_the_arm_and_the_discrepancy(
+    open_page: Open, served: tuple[str, int], broken: Path, models: dict[str, RobotModel]
+) -> None:
+    page = open_page(served[0] + "/", offline=False, drawn=False)
+    page.wait_for_selector("#discrepancies table", timeout=60_000)
+    tables = [DHNumpy(model.table) for model in (load_model(broken), models["ur5"])]
+
+    def shown() -> tuple[list[float], str]:
+        """q as the page tells it, and what it says of urdf:pinocchio at tool0."""
+        found = re.search(r"q = \[([^\]]*)\]", page.locator("#discrepancies").inner_text())
+        assert found
+        row = page.locator("#discrepancies tr", has=page.locator("th", has_text="tool0")).locator("td").nth(1).inner_text()
+        return [float(x) for x in found[1].split(",")], row
+
+    def expected(q: list[float]) -> str:
+        T_a, T_b = (engine.placements(np.array([q]), ("tool",))[0, 0] for engine in tables)
+        return metres(float(position_error(T_a, T_b)))
+
+    assert shown()[0] == [0.0] * 6
+    assert f"✗ {expected([0.0] * 6)}" in shown()[1]
+    seen = {shown()[1]}
+    for joint, drag in ((2, 30), (3, 30), (4, -25), (5, 0)):
+        before, head = shown()[0], page.locator("#discrepancies").inner_text().split(";")[0]
+        thumb = page.locator("[role=slider]").nth(joint)
+        if drag:
+            box = thumb.bounding_box()
+            assert box
+            x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+            page.mouse.move(x, y)
+            page.mouse.down()
+            page.mouse.move(x + drag, y, steps=4)
+            page.mouse.up()
+        else:
+            thumb.focus()
+            page.keyboard.press("ArrowRight")
+        until(page, f"!document.querySelector('#discrepancies').innerText.startsWith({head!r})")
+        page.wait_for_timeout(700)
+        q, row = shown()
+        assert q[joint] != before[joint]
+        assert f"✗ {expected(q)}" in row
+        seen.add(row)
+    assert len(seen) >= 3
+
+
+def test_buttons_go_to_the_worst_the_published_and_the_singular(open_page: Open, served: tuple[str, int]) -> None:
+    page = open_page(served[0] + "/", offline=False, drawn=False)
+    page.wait_for_selector("#discrepancies table", timeout=60_000)
+    for name in (r"urdf:pinocchio at ", "article", r"1: smallest singular value"):
+        before = page.locator("#discrepancies p").first.inner_text()
+        page.get_by_role("button", name=re.compile(name)).first.click()
+        until(page, f"document.querySelector('#discrepancies p').innerText !== {before!r}")
+    assert page.get_by_role("button", name=re.compile("share", re.I)).count() == 0
+    page.get_by_label("urdf:pinocchio").uncheck()
+
+
+def test_only_this_machine_is_served(served: tuple[str, int]) -> None:
+    process = psutil.Process(served[1])
+    processes = [process, *process.children(recursive=True)]
+    listening = [c.laddr.ip for p in processes for c in p.net_connections() if c.status == "LISTEN"]
+    assert listening
+    assert set(listening) == {"127.0.0.1"}
+
+
+def test_the_browser_is_there() -> None:
+    assert Path(BROWSER).is_file()
