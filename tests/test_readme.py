@@ -64,12 +64,14 @@ def test_the_example_prints_what_it_shows(tmp_path: Path) -> None:
         "diff",
         "identify",
         "mutate",
+        "accept",
+        "view",
     ],
 )
 def test_every_command_is_shown(command: str) -> None:
     assert command in cli.commands
     assert f"crosscheck {command}" in README
-    assert len(cli.commands) == 11
+    assert len(cli.commands) == 13
 
 
 def test_every_source_and_robot_is_listed() -> None:

@@ -36,6 +36,7 @@ from harness.report.text import (
 # ColorBrewer YlOrBr: light to dark, told apart by the colour-blind, always with the number beside it.
 _SCALE = ("#ffffe5", "#fff7bc", "#fee391", "#fec44f", "#fe9929", "#ec7014", "#cc4c02", "#993404", "#662506")
 LOWEST, HIGHEST = -16.0, -1.0
+TINY = 1e-300
 GOOD = ("agrees", "agrees as accepted", "accepted", "reference")
 
 
@@ -84,7 +85,7 @@ def render_html(report: Report) -> str:
         certified=[s for s in report.sources if s.certificate],
         explained=[s for s in report.sources if s.explanation],
         absent=[s for s in report.sources if s.status != "ran"],
-        posed=[s for s in report.sources if s.pose],
+        posed=posed(report),
         tree=_tree(report),
         legend=legend(),
         plotly_version=plotly.version,
@@ -114,6 +115,12 @@ def failing(report: Report) -> list[Source]:
     return sorted(bad, key=lambda s: s.verdict in ("not run", "failed"))
 
 
+def posed(report: Report) -> list[Source]:
+    """The sources with a picture: first those that disagree, then those that do as accepted."""
+    bad = failing(report)
+    return sorted((s for s in report.sources if s.pose), key=lambda s: (s not in bad, s.verdict != "agrees as accepted"))
+
+
 def colour(value: float) -> str:
     """Inline style of a matrix cell: background by the power of ten, text dark or light to match."""
     exponent = math.log10(value) if value > 0 else LOWEST
@@ -129,10 +136,14 @@ def legend() -> list[tuple[str, str]]:
     return [(colour(10.0**e), f"1e{round(e)}") for e in exponents]
 
 
-def _worst(report: Report) -> FrameResult | None:
-    """The frame that is furthest over its source's tolerance, of all sources."""
-    found = [(f.position.max / s.tolerance.position, f) for s in report.sources for f in s.frames if s.tolerance.position > 0]
-    return max(found, key=lambda pair: pair[0])[1] if found else None
+def _worst(report: Report) -> tuple[FrameResult, FrameResult] | None:
+    """The frames that are furthest off, over their source's tolerance: in position, and in rotation."""
+    found = [(f, s.tolerance) for s in report.sources for f in s.frames]
+    if not found:
+        return None
+    by_position = max(found, key=lambda pair: pair[0].position.max / max(pair[1].position, TINY))
+    by_rotation = max(found, key=lambda pair: pair[0].rotation.max / max(pair[1].rotation, TINY))
+    return by_position[0], by_rotation[0]
 
 
 def _numbered(report: Report) -> list[Cell]:

@@ -163,12 +163,15 @@ def test_the_copy_button_works_without_the_clipboard_interface(open_page: Open, 
 
 def test_on_paper_everything_is_open_and_nothing_is_a_control(open_page: Open, site: Path) -> None:
     page = open_page(f"file://{site}/ur5.html")
+    until(page, "skeleton.dataset.kept === 'yes'")
     assert len(page.pdf()) > 50_000
     assert page.evaluate("[...document.querySelectorAll('details')].every(d => d.open)")
     page.emulate_media(media="print")
     for hidden in ("nav", "#copy", "#skeleton-source"):
         assert not page.locator(hidden).is_visible()
     assert page.locator("#parameters").is_visible()
+    assert page.evaluate("document.getElementById('skeleton-paper').naturalWidth") == 1000
+    assert page.locator("#skeleton-paper").is_visible()
 
 
 def test_without_3d_the_tables_say_the_same(open_page: Open, site: Path, browser: Any) -> None:

@@ -49,6 +49,19 @@ function drawSkeleton(figures) {
   return Plotly.react(plot, traces, layout, CONFIG);
 }
 
+let pending;
+
+// A drawing in 3D comes out blank on paper: a picture of it is kept there, renewed when it is at rest.
+function keepPicture(plot) {
+  clearTimeout(pending);
+  pending = setTimeout(async () => {
+    const picture = byId("skeleton-paper");
+    picture.src = await Plotly.toImage(plot, { format: "png", width: 1000, height: 560 }).catch(() => "");
+    picture.hidden = !picture.src.startsWith("data:");
+    plot.dataset.kept = "yes";
+  }, 400);
+}
+
 function turn(plot, around, up, closer) {
   const camera = structuredClone(plot.layout.scene.camera);
   const { x, y, z } = camera.eye;
@@ -84,7 +97,10 @@ async function figures() {
   const plot = byId("skeleton");
   await loadPlotly();
   const redraw = async () => {
-    if (plot && showsWebGL()) await drawSkeleton(data.skeletons);
+    if (plot && showsWebGL()) {
+      await drawSkeleton(data.skeletons);
+      keepPicture(plot);
+    }
     if (byId("distribution")) await drawDistribution(data.distribution);
   };
   await redraw();
@@ -105,7 +121,7 @@ async function figures() {
     choose();
     for (const button of document.querySelectorAll("[data-turn]")) button.addEventListener("click", () => turn(plot, ...steps[button.dataset.turn]));
     byId("skeleton-home").addEventListener("click", () => Plotly.relayout(plot, { "scene.camera": structuredClone(HOME) }));
-    plot.on("plotly_relayout", () => (plot.dataset.eye = JSON.stringify(plot.layout.scene.camera.eye)));
+    plot.on("plotly_relayout", () => keepPicture(plot));
   } else if (plot) {
     plot.textContent = "This browser shows no 3D (WebGL). The table below has both placements of every frame.";
   }
