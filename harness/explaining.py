@@ -22,6 +22,7 @@ from harness.se3 import Array
 from harness.sources import pair_tolerance
 
 FITTED, CHECKED = 16, 48
+ROUNDING = 2.0**-46  # of a length: 64 units in the last place, for a product of a dozen transforms
 SHARED = 0.5  # of the tolerance: what another source's repair may leave of this one
 
 
@@ -37,6 +38,9 @@ def problem_of(
     names = tuple(f.name for f in frames)
     parts = (Seen(q[:FITTED], T_a[:FITTED], T_b[:FITTED]), Seen(q[FITTED:], T_a[FITTED:], T_b[FITTED:]))
     kinds = [kind_of(bound.engine.source) for bound in (reference, source)]
+    # Lengths in millimetres taken for metres come with a thousand times the rounding: a right repair leaves that.
+    largest = max(float(np.nan_to_num(np.abs(T[..., :3, 3])).max(initial=0.0)) for T in (T_a, T_b))
+    tolerance = (max(tolerance[0], ROUNDING * largest), tolerance[1])
     recipes = []
     for bound, kind, T in zip((reference, source), kinds, (T_a, T_b), strict=True):
         packaged = bound.engine.takes == "packaged"

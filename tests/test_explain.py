@@ -71,6 +71,8 @@ def test_d1_names_the_joint_the_size_and_what_is_the_same(models: dict[str, Robo
         ("ur5", "rows read as the other convention", ("convention", "", "")),
         ("ur10", "table in degrees", ("degrees", "description", "")),
         ("ur10", "URDF in millimetres", ("millimetres", "", "")),
+        ("sixr", "URDF in millimetres", ("millimetres", "", "")),
+        ("stanford", "table in millimetres", ("millimetres", "", "")),
         ("ur5", "table with pi = 3.1416", ("truncated pi", "", "")),
         ("sixr", "table as float32", ("float32", "", "")),
         ("panda", "panda_joint3 and panda_joint4 exchanged", ("order", "panda_joint4", "panda_joint3")),
