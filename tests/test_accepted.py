@@ -123,6 +123,17 @@ def test_other_settings_cannot_be_compared(report: Report) -> None:
     assert compared(other, numbers, False).verdict.exit_code == 0
 
 
+def test_fewer_configurations_are_a_part_of_those_accepted(report: Report, models: dict[str, RobotModel]) -> None:
+    numbers = accepted_from(report)
+    fewer = crosscheck(models["sixr"], Options(20, 0, FAST, command="crosscheck run sixr"))
+    found = since(numbers, fewer, True)
+    assert not found.worse
+    assert found.note == "looked at 20 of the 50 random configurations accepted"
+    assert since(numbers, grown(fewer, "urdf:pinocchio", 1e-3), True).worse
+    shrunk = since(accepted_from(grown(report, "urdf:pinocchio", 1e-3)), fewer, True)
+    assert not shrunk.moved
+
+
 def test_an_exit_code_of_1_stays(report: Report) -> None:
     failed = report.model_copy(update={"verdict": report.verdict.model_copy(update={"exit_code": 3, "sentence": "sixr IS NOT"})})
     assert compared(grown(failed, "urdf:pinocchio", 1.0), accepted_from(report), True).verdict.exit_code == 1

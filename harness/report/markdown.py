@@ -89,10 +89,11 @@ def _since(report: Report) -> list[str]:
         return []
     if g.problem:
         return [f"- since {_md(g.accepted)}: not comparable, {_md(g.problem)}"]
+    note = f" ({_md(g.note)})" if g.note else ""
     if not g.moved and not g.changed:
-        return [f"- since {_md(g.accepted)}: nothing moved by more than the noise floor"]
+        return [f"- since {_md(g.accepted)}: nothing moved by more than the noise floor{note}"]
     counts = f"{len(g.grown)} numbers grew, {len(g.moved) - len(g.grown)} shrank, {len(g.changed)} things changed"
-    head = f"- since {_md(g.accepted)}: {counts}"
+    head = f"- since {_md(g.accepted)}: {counts}{note}"
     worst = sorted(g.moved, key=lambda m: m.before - m.after)
     changed = [f"  - {_md(f'{c.what}: {c.before}, now {c.after}')}" for c in sorted(g.changed, key=lambda c: not c.worse)]
     return [head, *changed[:1], *(f"  - {_md(moved_text(m))}" for m in worst), *changed[1:]]

@@ -32,10 +32,12 @@ class Changed(Part):
 
 
 class Regression(Part):
-    """Against the numbers accepted on the day `accepted`. problem: why they cannot be compared with this run, if so."""
+    """Against the numbers accepted on the day `accepted`. problem: why they cannot be compared with this run, if so.
+    note: what was looked at, if less than what was accepted; what shrank is not told then."""
 
     accepted: str
     problem: str = ""
+    note: str = ""
     moved: list[Moved] = []
     changed: list[Changed] = []
     strict: bool = False

@@ -58,7 +58,8 @@ def _since(report: Report, console: Console) -> None:
         console.print(Text(plain(f"  since {g.accepted}: not comparable, {g.problem}"), style="yellow"), soft_wrap=True)
         return
     if not g.moved and not g.changed:
-        console.print(Text(plain(f"  since {g.accepted}: nothing moved by more than the noise floor")), soft_wrap=True)
+        note = f" ({g.note})" if g.note else ""
+        console.print(Text(plain(f"  since {g.accepted}: nothing moved by more than the noise floor{note}")), soft_wrap=True)
     for moved in g.moved[:MAX_MOVED]:
         style = "red" if moved.after > moved.before else ""
         console.print(Text(plain(f"  since {g.accepted}: {moved_text(moved)}"), style=style), soft_wrap=True)
