@@ -5,12 +5,14 @@ from __future__ import annotations
 from harness.report import document as doc
 from harness.report.text import metres, radians
 
+FAILING = ("disagrees", "invalid placements", "keeps state")
+
 
 def verdict(robot: str, sources: list[doc.Source], published: list[doc.PublishedResult], settings: doc.Settings) -> doc.Verdict:
     """The gate. A disagreement found (1) stays found even if a required source is missing (3)."""
     wrong, missing = [], []
     for source in sources:
-        if source.verdict in ("disagrees", "invalid placements", "keeps state"):
+        if source.verdict in FAILING:
             wrong.append(f"{source.name}: {describe(source)}")
         elif source.status != "ran" and source.required:
             install = f" ({source.install})" if source.install else ""
@@ -21,7 +23,8 @@ def verdict(robot: str, sources: list[doc.Source], published: list[doc.Published
     if not compared and not missing and not wrong:
         missing.append("no source was compared: " + "; ".join(f"{s.name} {s.status}" for s in sources))
     if wrong:
-        sentence = f"{robot} DISAGREES: {wrong[0]}"
+        others = [s.name for s in sources if s.verdict in FAILING][1:]
+        sentence = f"{robot} DISAGREES: {wrong[0]}" + (f"; likewise {', '.join(others)}" if others else "")
         return doc.Verdict(exit_code=1, sentence=sentence, reasons=wrong + missing)
     if missing:
         return doc.Verdict(exit_code=3, sentence=f"{robot} IS NOT VERIFIED: {missing[0]}", reasons=missing)
@@ -95,7 +98,11 @@ def describe(source: doc.Source) -> str:
         return f"{worst.frame} is within tolerance where it was sampled, but {why}"
     if worst.verdict == "not compared":
         return f"frame {worst.frame} was not compared: the engine does not have it or returned nothing finite"
-    by = f"{worst.frame} off by {metres(worst.position.max)}, {radians(worst.rotation.max)}"
+    sizes = (
+        (metres(worst.position.max), worst.position.max > source.tolerance.position),
+        (radians(worst.rotation.max), worst.rotation.max > source.tolerance.rotation),
+    )
+    by = f"{worst.frame} off by {', '.join(text for text, over in sizes if over) or ', '.join(text for text, _ in sizes)}"
     if worst.verdict.startswith("deviation") and worst.accepted:
         by += f"; the {worst.verdict} from the accepted {worst.accepted.position:g} m, {worst.accepted.rotation:g} rad"
     where = (

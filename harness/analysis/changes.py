@@ -73,7 +73,9 @@ def of_parameter(
         text = f"{parameter.owner}: {wanted_by} has it {how}"
     else:
         here, there = value(before, unit, 12), value(before + size, unit, digits)
-        text = f"{parameter.name} of {parameter.owner}: {here} in {label}, {there} in {wanted_by} ({by})"
+        # A table has no `origin z`: of a number of b it is said what would fit a, not that it stood there.
+        other = f"{there} in {wanted_by}" if side == "a" else f"{there} would fit {wanted_by}"
+        text = f"{parameter.name} of {parameter.owner}: {here} in {label}, {other} ({by})"
     return Change("parameter", side, parameter.owner, parameter.name, size, before, unit, text)
 
 

@@ -162,7 +162,7 @@ def _triads(T: Array, size: float, dash: str, named: bool) -> list[Figure]:
         traces.append(
             {"type": "scatter3d", "mode": "lines+text" if named else "lines", "name": f"{letter} axes", "showlegend": named,
              "x": lines[0], "y": lines[1], "z": lines[2], "text": text, "hoverinfo": "skip", "legendgroup": letter,
-             "line": {"color": colour, "width": 4 if named else 3, "dash": dash}}
+             "line": {"color": colour, "width": 4, "dash": dash}}
         )  # fmt: skip
     return traces
 
@@ -184,7 +184,7 @@ def _bars(source: Source, statistics: Statistics, i: int, axis: str, visible: bo
     pattern = {"shape": PATTERNS[i % len(PATTERNS)], "fgopacity": 0.9, "size": 6}
     return {
         "type": "bar", "name": name, "legendgroup": name, "showlegend": axis == "", "xaxis": "x" + axis, "yaxis": "y" + axis,
-        "x": [k for k, _ in counts], "y": [v for _, v in counts],
+        "x": [k + 0.5 for k, _ in counts], "y": [v for _, v in counts],
         "hovertext": [f"{name}: {v} from 1e{k} to 1e{k + 1}" for k, v in counts], "hoverinfo": "text",
         "marker": {"color": BARS[i % len(BARS)], "pattern": pattern, "line": {"width": 1}},
         "visible": True if visible else "legendonly",

@@ -81,6 +81,9 @@ def render_html(report: Report) -> str:
         anchors={s.name: f"source-{i}" for i, s in enumerate(report.sources)},
         failing=failing(report),
         causes=_causes(report),
+        misfiled=[p for p in report.published if p.found == "wrong" and p.status == "holds"],
+        proven_within=sum(_proven_within(s) for s in report.sources),
+        blind={frame.name for frame in report.frames if frame.relation == "rigid"},
         side_by_side=_side_by_side(report),
         certified=[s for s in report.sources if s.certificate],
         explained=[s for s in report.sources if s.explanation],
@@ -157,6 +160,12 @@ def _matrix(report: Report) -> list[tuple[Source, list[Cell | None]]]:
     return [(a, [pairs.get(frozenset((a.name, b.name))) for b in ran]) for a in ran]
 
 
+def _proven_within(source: Source) -> bool:
+    """Whether the bounds over all configurations are within tolerance at every frame."""
+    bounds, limits = source.certificate.frames if source.certificate else [], source.tolerance
+    return bool(bounds) and all(b.position_upper <= limits.position and b.rotation_upper <= limits.rotation for b in bounds)
+
+
 def _causes(report: Report) -> list[tuple[str, Explanation, list[Source]]]:
     """Sources with the same explanation together: their names, the explanation, the sources."""
     groups: dict[tuple[str, ...], list[tuple[Source, Explanation]]] = {}
@@ -172,7 +181,7 @@ def _side_by_side(report: Report) -> list[tuple[str, list[str], list[tuple[str, 
     for pair in report.parameters.rows if report.parameters else []:
         rows.setdefault(pair.subject, []).append(pair)
     tables = []
-    for title, ends in (("joint", False), ("ends", True)):
+    for title, ends in (("joint", False), ("base and tool", True)):
         chosen = [(subject, cells) for subject, cells in rows.items() if (subject in ("base", "tool")) == ends]
         heads = [f"{p.parameter} [{'mm' if p.unit == 'm' else 'deg'}]" for p in chosen[0][1]] if chosen else []
         tables.append((title, heads, chosen))

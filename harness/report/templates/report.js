@@ -44,6 +44,7 @@ function drawSkeleton(figures) {
     legend: { orientation: "h", y: 0, yanchor: "top" },
     scene: { xaxis: title("x"), yaxis: title("y"), zaxis: title("z"), aspectmode: "data", camera: structuredClone(camera), dragmode: "orbit" },
     uirevision: "kept",
+    annotations: found.magnified && wanted.checked ? [{ text: `<b>differences × ${found.factor.toLocaleString("en")}</b>`, xref: "paper", yref: "paper", x: 0.01, y: 0.99, showarrow: false, xanchor: "left", yanchor: "top", font: { color: text, size: 14 } }] : [],
   };
   for (const panel of document.querySelectorAll("[data-pose]")) panel.hidden = panel.dataset.pose !== byId("skeleton-source").value;
   return Plotly.react(plot, traces, layout, CONFIG);
@@ -74,15 +75,15 @@ function turn(plot, around, up, closer) {
 
 function drawDistribution(traces) {
   const { base, axis } = ink();
-  const along = (title) => ({ ...axis, title: { text: title }, tickprefix: "1e", dtick: 2 });
+  const along = (title) => ({ ...axis, title: { text: title }, tickprefix: "1e", dtick: 2, automargin: true });
   const count = { ...axis, title: { text: "configurations" }, rangemode: "tozero" };
   const layout = {
     ...base,
-    grid: { rows: 2, columns: 1, pattern: "independent", ygap: 0.45 },
+    grid: { rows: 2, columns: 1, pattern: "independent", ygap: 0.35 },
     barmode: "group",
-    margin: { l: 60, r: 10, t: 10, b: 45 },
+    margin: { l: 60, r: 10, t: 10, b: 60 },
     legend: { orientation: "h", y: 1.02, yanchor: "bottom" },
-    xaxis: along("position discrepancy [m], from"), yaxis: count, xaxis2: along("rotation discrepancy [rad], from"), yaxis2: count,
+    xaxis: along("position discrepancy [m]"), yaxis: count, xaxis2: along("rotation discrepancy [rad]"), yaxis2: count,
   };
   return Plotly.react(byId("distribution"), traces, layout, CONFIG);
 }
