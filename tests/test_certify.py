@@ -284,7 +284,7 @@ def test_a_broken_premise_is_refused(
     monkeypatch.setattr("harness.certificates.GRID_LIMIT", limit)
     known = {**registry.registered(), "dh:fake": Registered("dh:fake", adapter)}
     monkeypatch.setattr(registry, "registered", lambda: known)
-    report = crosscheck(models["stanford"], Options(20, 0, ("dh:fake", "dh:pinocchio")))
+    report = crosscheck(models["stanford"], Options(20, 0, ("dh:fake", "dh:pinocchio"), explain=False))
     proof = certificate(report, "dh:fake")
     assert proof.status == "refused"
     assert proof.frames == []
@@ -306,9 +306,9 @@ def test_a_reference_that_breaks_the_premise_ends_no_run(
 
 
 def test_the_smaller_of_both_forms_counts(models: dict[str, RobotModel], monkeypatch: pytest.MonkeyPatch) -> None:
-    both = certificate(crosscheck(models["ur5e"], Options(20, 0, FAST)), "urdf:pinocchio")
+    both = certificate(crosscheck(models["ur5e"], Options(20, 0, FAST, explain=False)), "urdf:pinocchio")
     monkeypatch.setattr("harness.certificates.GRID_LIMIT", 10)
-    links = certificate(crosscheck(models["ur5e"], Options(20, 0, FAST)), "urdf:pinocchio")
+    links = certificate(crosscheck(models["ur5e"], Options(20, 0, FAST, explain=False)), "urdf:pinocchio")
     assert (both.form, links.form) == ("grid", "links")
     for a, b in zip(both.frames, links.frames, strict=True):
         assert a.position_upper <= b.position_upper
@@ -323,11 +323,11 @@ def test_an_engine_that_clamps_agrees_within_limits_but_not_at_the_gate(
     monkeypatch.setattr(registry, "registered", lambda: known)
     folder = copy_model("sixr", ("model.toml", 'name = "dh:pinocchio"', 'name = "dh:fake"'))
     (folder / "configurations.toml").write_text("")
-    sampled = crosscheck(load_model(folder), Options(200, 0, ("dh:fake",)))
+    sampled = crosscheck(load_model(folder), Options(200, 0, ("dh:fake",), explain=False))
     assert sampled.verdict.exit_code == 0
     text = (folder / "model.toml").read_text().replace('convention = "modified"', 'convention = "modified"\ngate = "certified"')
     (folder / "model.toml").write_text(text)
-    report = crosscheck(load_model(folder), Options(200, 0, ("dh:fake",)))
+    report = crosscheck(load_model(folder), Options(200, 0, ("dh:fake",), explain=False))
     assert report.verdict.exit_code == 1
     assert "is within tolerance where it was sampled, but dh:fake is not the polynomial" in report.verdict.sentence
 
@@ -352,7 +352,7 @@ def test_coupled_joints_take_more_nodes(copy_model: Callable[..., Path]) -> None
     model = load_model(folder)
     axes = joint_axes(model)
     assert [(axis.degree, round(axis.upper / (2 * math.pi))) for axis in axes] == [(1, 1), (2, 1), (3, 2), (1, 1)]
-    proof = certificate(crosscheck(model, Options(20, 0, FAST)), "urdf:pinocchio")
+    proof = certificate(crosscheck(model, Options(20, 0, FAST, explain=False)), "urdf:pinocchio")
     assert (proof.status, proof.nodes) == ("certified", 3 * 5 * 7 * 3)
     assert chain_links(model, list(range(6)))[3].joints == (1, 2)
 
@@ -364,7 +364,7 @@ def test_a_factor_that_is_no_fraction(copy_model: Callable[..., Path]) -> None:
     model = load_model(folder)
     with pytest.raises(UncertifiableError, match="'elbow_flex' drives a link by a factor that is no simple fraction"):
         joint_axes(model)
-    assert certificate(crosscheck(model, Options(5, 0, FAST)), "dh:pinocchio").status == "refused"
+    assert certificate(crosscheck(model, Options(5, 0, FAST, explain=False)), "dh:pinocchio").status == "refused"
 
 
 def test_a_joint_that_turns_and_slides(copy_model: Callable[..., Path]) -> None:
@@ -380,7 +380,7 @@ def test_a_joint_that_turns_and_slides(copy_model: Callable[..., Path]) -> None:
 def test_long_chains_go_link_by_link(models: dict[str, RobotModel], monkeypatch: pytest.MonkeyPatch) -> None:
     """The same model both ways: the composed bounds hold too, and are not absurdly loose."""
     monkeypatch.setattr("harness.certificates.GRID_LIMIT", 100)
-    report = crosscheck(models["ur5e"], Options(100, 0, FAST))
+    report = crosscheck(models["ur5e"], Options(100, 0, FAST, explain=False))
     proof = certificate(report, "urdf:pinocchio")
     assert (proof.status, proof.form) == ("certified", "links")
     assert proof.nodes < 60
@@ -398,7 +398,7 @@ def test_a_mimic_follower_on_the_chain(copy_model: Callable[..., Path]) -> None:
     (folder / "configurations.toml").write_text("")
     model = load_model(folder)
     assert [axis.degree for axis in joint_axes(model)] == [1, 1, 3]
-    report = crosscheck(model, Options(300, 0, ("urdf:pinocchio", "urdf:yourdfpy")))
+    report = crosscheck(model, Options(300, 0, ("urdf:pinocchio", "urdf:yourdfpy"), explain=False))
     assert report.verdict.exit_code == 1
     for name in ("urdf:pinocchio", "urdf:yourdfpy"):  # one is passed the follower's value, the other moves it itself
         proof = certificate(report, name)

@@ -37,7 +37,7 @@ SAMPLES = 9000  # three blocks
 def with_fault(model: RobotModel, fault: str, **options: object) -> Report:
     workers = (("controller", (sys.executable, WORKER, fault)),)
     sources = ("dh:pinocchio",)
-    defaults = {"samples": SAMPLES, "sources": sources, "workers": workers, "limits": LIMITS, "certify": False}
+    defaults = {"samples": SAMPLES, "sources": sources, "workers": workers, "limits": LIMITS, "certify": False, "explain": False}
     return crosscheck(model, Options(**{**defaults, **options}))  # type: ignore[arg-type]
 
 
