@@ -78,6 +78,13 @@ def test_without_a_certificate(cli: Cli, tmp_path: Path) -> None:
     assert all(source.certificate is None for source in report.sources)
 
 
+def test_a_run_adds_to_the_summary_of_the_job(cli: Cli, tmp_path: Path) -> None:
+    (tmp_path / "summary.md").write_text("before\n")
+    cli("run", "sixr", *FAST, "--no-certify", GITHUB_STEP_SUMMARY=str(tmp_path / "summary.md"))
+    written = (tmp_path / "reports" / "sixr.md").read_text()
+    assert (tmp_path / "summary.md").read_text() == "before\n" + written + "\n"
+
+
 def test_json_and_quiet(cli: Cli) -> None:
     result = cli("run", "ur5", "sixr", *FAST, "--json")
     documents = [Report.model_validate_json(line) for line in result.stdout.splitlines()]

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from harness import se3
 from harness.description.model import RobotModel
 from harness.options import Options
+from harness.report import figures
 from harness.report.figures import SEEN, _factor, _magnified, _placements, apart, distribution, letters, skeletons
-from harness.report.html import colour
+from harness.report.html import colour, render_html
 from harness.report.pose import FramePair, Pose
 from harness.report.scripts import data, own, plotly
 from harness.report.source_parts import At
@@ -117,6 +118,18 @@ def test_every_drawn_number_is_one_compared(models: dict[str, RobotModel]) -> No
         frame = next(f for f in source.frames if f.frame == source.worst_frame)
         assert sum(bars[2 * i]["y"]) == frame.position.count
         assert sum(bars[2 * i + 1]["y"]) == frame.rotation.count
+
+
+def test_what_is_drawn_has_a_budget(models: dict[str, RobotModel], monkeypatch: pytest.MonkeyPatch) -> None:
+    report = crosscheck(models["ur5"], Options(20, 0, ("dh:pinocchio", "urdf:pinocchio"), certify=False))
+    worse = [s.model_copy(update={"verdict": "disagrees"}) if s.name == "urdf:pinocchio" else s for s in report.sources]
+    report = report.model_copy(update={"sources": worse})
+    one = len(json.dumps(skeletons(report)["source-2"]))
+    monkeypatch.setattr(figures, "BUDGET", one + 10)
+    assert list(skeletons(report)) == ["source-2"]
+    many = [worse[2].model_copy(update={"name": f"urdf:engine{i}"}) for i in range(60)]
+    monkeypatch.undo()
+    assert len(render_html(report.model_copy(update={"sources": [*worse, *many]}))) < 3e6
 
 
 def test_colours_grow_darker_with_the_exponent() -> None:

@@ -5,6 +5,7 @@ Colours are those of Okabe and Ito, told apart by the colour-blind; line style, 
 
 from __future__ import annotations
 
+import json
 import math
 from typing import Any
 
@@ -24,6 +25,7 @@ PATTERNS = ("", "/", "x", ".", "\\", "-", "|", "+")
 SEEN = 0.12  # of the arm's extent: how far apart a magnified difference is drawn
 TURNED = 0.6  # rad, likewise
 TRIAD_SIZE = 0.06
+BUDGET = 450_000  # bytes: with Plotly and the tables a report stays below 3 MB
 
 Figure = dict[str, Any]
 
@@ -34,20 +36,28 @@ def letters(text: str) -> str:
 
 
 def skeletons(report: Report) -> dict[str, Figure]:
-    """For each source with a picture, by its place: traces as they are, and magnified by `factor` if too small to see."""
+    """For each source with a picture, by its place: traces as they are, and magnified by `factor` if too small to see.
+
+    Those that disagree come first; what would make the page larger than BUDGET is left out.
+    """
     found: dict[str, Figure] = {}
     order = {label.label: i for i, label in enumerate(report.trees.dh)}
     rank = {frame.name: order.get(frame.dh, len(order)) for frame in report.frames}
-    for i, source in enumerate(report.sources):
+    spent = 0
+    for i, source in sorted(enumerate(report.sources), key=lambda pair: pair[1].verdict == "agrees"):
         if source.pose is None:
             continue
         pose = source.pose.model_copy(update={"frames": sorted(source.pose.frames, key=lambda f: rank[f.frame])})
         factor = _factor(pose) if source.verdict != "agrees" else 1.0
-        found[f"source-{i}"] = {
+        figure = {
             "true": _traces(pose, report.settings.reference, source.name, 1.0),
             "magnified": _traces(pose, report.settings.reference, source.name, factor) if factor > 1.0 else None,
             "factor": factor,
         }
+        spent += len(json.dumps(figure))
+        if spent > BUDGET:
+            break
+        found[f"source-{i}"] = figure
     return found
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from harness.report import figures
 from harness.report.document import Report
 from harness.report.files import write_report
 from tests.browser.conftest import Open, until
@@ -118,6 +119,20 @@ def test_the_skeleton_shows_the_source_chosen_magnified_or_not(open_page: Open, 
     order = [frame.name for frame in documents["ur5"].frames]
     frames = sorted(pose.frames, key=lambda f: order.index(f.frame))
     assert page.evaluate("skeleton.data[0].x") == pytest.approx([f.reference[0][3] for f in frames], abs=1e-6)
+
+
+def test_a_source_that_is_not_drawn_says_so(
+    open_page: Open, documents: dict[str, Report], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(figures, "BUDGET", len(json.dumps(figures.skeletons(documents["ur5"])["source-2"])) + 10)
+    write_report(documents["ur5"], tmp_path)
+    page = open_page(f"file://{tmp_path}/ur5.html")
+    page.locator("#skeleton-source").select_option(label="dh:pinocchio")
+    until(page, "skeleton.textContent.startsWith('Not drawn')")
+    assert page.locator("#source-1").is_visible()
+    page.locator("#skeleton-source").select_option(label="urdf:pinocchio")
+    until(page, "skeleton.data?.[1].name === 'urdf:pinocchio'")
+    assert page.locator("#skeleton canvas").count() >= 1
 
 
 def test_a_matrix_cell_leads_to_its_detail(open_page: Open, site: Path) -> None:

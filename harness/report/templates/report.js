@@ -31,6 +31,13 @@ function drawSkeleton(figures) {
   const plot = byId("skeleton");
   const found = figures[byId("skeleton-source").value];
   const wanted = byId("skeleton-magnified");
+  for (const panel of document.querySelectorAll("[data-pose]")) panel.hidden = panel.dataset.pose !== byId("skeleton-source").value;
+  if (!found) {
+    Plotly.purge(plot);
+    plot.textContent = "Not drawn, to keep this file small. The table below has the numbers.";
+    return;
+  }
+  if (!plot.layout) plot.textContent = "";
   wanted.disabled = !found.magnified;
   byId("skeleton-factor").textContent = found.magnified ? `differences drawn ${found.factor.toLocaleString("en")} times as large` : "nothing to magnify";
   const traces = structuredClone(found.magnified && wanted.checked ? found.magnified : found.true);
@@ -46,7 +53,6 @@ function drawSkeleton(figures) {
     uirevision: "kept",
     annotations: found.magnified && wanted.checked ? [{ text: `<b>differences × ${found.factor.toLocaleString("en")}</b>`, xref: "paper", yref: "paper", x: 0.01, y: 0.99, showarrow: false, xanchor: "left", yanchor: "top", font: { color: text, size: 14 } }] : [],
   };
-  for (const panel of document.querySelectorAll("[data-pose]")) panel.hidden = panel.dataset.pose !== byId("skeleton-source").value;
   return Plotly.react(plot, traces, layout, CONFIG);
 }
 
@@ -100,7 +106,7 @@ async function figures() {
   const redraw = async () => {
     if (plot && showsWebGL()) {
       await drawSkeleton(data.skeletons);
-      keepPicture(plot);
+      if (plot.layout) keepPicture(plot);
     }
     if (byId("distribution")) await drawDistribution(data.distribution);
   };
@@ -122,7 +128,7 @@ async function figures() {
     choose();
     for (const button of document.querySelectorAll("[data-turn]")) button.addEventListener("click", () => turn(plot, ...steps[button.dataset.turn]));
     byId("skeleton-home").addEventListener("click", () => Plotly.relayout(plot, { "scene.camera": structuredClone(HOME) }));
-    plot.on("plotly_relayout", () => keepPicture(plot));
+    plot.on?.("plotly_relayout", () => keepPicture(plot));
   } else if (plot) {
     plot.textContent = "This browser shows no 3D (WebGL). The table below has both placements of every frame.";
   }
