@@ -75,6 +75,18 @@ def eye(page: Any) -> list[float]:
     return [found[k] for k in "xyz"]
 
 
+def moved_from(page: Any, before: list[float]) -> list[float]:
+    """Where the eye is, once it has left `before` and is at rest."""
+    last = before
+    for _ in range(100):
+        page.wait_for_timeout(200)
+        now = eye(page)
+        if now == last and max(abs(a - b) for a, b in zip(now, before, strict=True)) > 0.1:
+            return now
+        last = now
+    raise AssertionError(f"the eye stayed at {before}")
+
+
 def test_the_skeleton_turns_under_the_mouse_and_by_keyboard(open_page: Open, site: Path) -> None:
     page = open_page(f"file://{site}/ur5.html")
     before = eye(page)
@@ -85,16 +97,12 @@ def test_the_skeleton_turns_under_the_mouse_and_by_keyboard(open_page: Open, sit
     page.mouse.down()
     page.mouse.move(x + 150, y + 30, steps=8)
     page.mouse.up()
-    page.wait_for_timeout(500)
-    turned = eye(page)
-    assert max(abs(a - b) for a, b in zip(turned, before, strict=True)) > 0.1
+    turned = moved_from(page, before)
     page.get_by_role("button", name="Turn left").focus()
     page.keyboard.press("Enter")
-    page.wait_for_timeout(500)
-    assert max(abs(a - b) for a, b in zip(eye(page), turned, strict=True)) > 0.1
+    further = moved_from(page, turned)
     page.get_by_role("button", name="Reset view").click()
-    page.wait_for_timeout(500)
-    assert eye(page) == pytest.approx(before, abs=1e-6)
+    assert moved_from(page, further) == pytest.approx(before, abs=1e-6)
 
 
 def test_the_skeleton_shows_the_source_chosen_magnified_or_not(open_page: Open, site: Path, documents: dict[str, Report]) -> None:
