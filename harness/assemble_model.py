@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-from typing import Literal
 
 from harness import se3
 from harness.description.dh import DHRow
@@ -14,12 +12,10 @@ from harness.explaining import recipes_of
 from harness.report.model_parts import DHFrame, Link, ParameterPair, SideBySide, Trees
 from harness.results import Results
 from harness.se3 import Array
-from harness.side_by_side import canonical_side, turned
+from harness.side_by_side import COLUMNS, Unit, canonical_side, less, turned
 
 MOST_LINKS = 120
 
-Unit = Literal["m", "rad"]
-NUMBERS: tuple[tuple[str, Unit], ...] = (("a", "m"), ("alpha", "rad"), ("d", "m"), ("theta", "rad"))
 PLACED: tuple[tuple[str, Unit], ...] = (
     ("x", "m"), ("y", "m"), ("z", "m"), ("roll", "rad"), ("pitch", "rad"), ("yaw", "rad"),
 )  # fmt: skip
@@ -75,7 +71,7 @@ def side_by_side(results: Results) -> SideBySide | None:
 
 
 def _row(a: DHRow, b: DHRow, limits: dict[Unit, float]) -> Iterator[ParameterPair]:
-    for name, unit in NUMBERS:
+    for name, unit in COLUMNS:
         yield _pair(a.name, name, unit, float(getattr(a, name)), float(getattr(b, name)), limits)
 
 
@@ -86,7 +82,7 @@ def _placed(subject: str, T_a: Array, T_b: Array, limits: dict[Unit, float]) -> 
 
 
 def _pair(subject: str, name: str, unit: Unit, a: float, b: float, limits: dict[Unit, float]) -> ParameterPair:
-    difference = b - a if unit == "m" else math.remainder(b - a, 2.0 * math.pi)
+    difference = less(b, a, unit)
     return ParameterPair(
         subject=subject, parameter=name, unit=unit, table=a, urdf=b, difference=difference, marked=abs(difference) > limits[unit]
     )

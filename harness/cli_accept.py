@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
-from harness.cli_run import accepted_option, complete_robots, models_option
+from harness.cli_run import accepted_option, complete_robots, folders_of, models_option
 from harness.console import console
-from harness.description.locate import default_models_dir, find_model, model_folders
+from harness.description.locate import default_models_dir
 from harness.description.model import load_model
 from harness.errors import InputError
 from harness.report.accepted import accepted_from, accepted_text
@@ -30,8 +30,7 @@ def accept(robots: tuple[str, ...], models: Path | None, out: Path, accepted: Pa
     that is meant goes into model.toml, with its reason.
     """
     folder = models or default_models_dir()
-    paths = [find_model(robot, folder) for robot in robots] if robots else list(model_folders(folder).values())
-    reports = [_current(path, out) for path in dict.fromkeys(paths)]
+    reports = [_current(path, out) for path in folders_of(robots, folder)]
     prepare(accepted)
     for report in reports:
         path = write(accepted / f"{report.robot.name}.json", accepted_text(accepted_from(report)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Literal, cast
+from typing import cast
 
 import click
 from rich.table import Table
@@ -21,13 +21,11 @@ from harness.errors import InputError
 from harness.identify import identify
 from harness.operands import read_operand
 from harness.report.text import metres, plain, radians
-from harness.side_by_side import turned
+from harness.side_by_side import COLUMNS, Unit, less, turned
 
 CHANGED = 1e-9
 ALIKE = 1e-3
 
-Unit = Literal["m", "rad"]
-COLUMNS: tuple[tuple[str, Unit], ...] = (("a", "m"), ("alpha", "rad"), ("d", "m"), ("theta", "rad"))
 HELP = "Link to start from, of the URDF; given twice: of A, then of B.  [default: the root]"
 
 
@@ -130,7 +128,7 @@ def _tables(found: Diff) -> None:
 
 def _cells(a: float, b: float, unit: Unit) -> list[Text]:
     scale = 1e3 if unit == "m" else 180.0 / math.pi
-    difference = b - a if unit == "m" else math.remainder(b - a, 2.0 * math.pi)
+    difference = less(b, a, unit)
     changed = abs(difference) > CHANGED
     return [
         Text(f"{round(a * scale, 6) + 0.0:.9g}"),

@@ -20,6 +20,8 @@ from harness.engines.registry import REFERENCE
 from harness.errors import EngineUnavailable
 from harness.options import Options
 from harness.report.text import plain
+from harness.view.page import Page
+from harness.view.session import Session
 
 LOOPBACK = "127.0.0.1"
 
@@ -55,9 +57,6 @@ def view(
         viser = importlib.import_module("viser")
     except ImportError as error:
         raise EngineUnavailable("view", f"import viser failed: {error}", "pip install 'fk-crosscheck[view]'") from None
-    from harness.view.page import Page  # noqa: PLC0415  the scene needs viser
-    from harness.view.session import Session  # noqa: PLC0415
-
     model = load_model(find_model(robot, models or default_models_dir()))
     options = Options(samples, seed, sources, reference, certify=False, explain=False)
     logging.getLogger("websockets").setLevel(logging.ERROR)  # a browser that goes away is no error of ours

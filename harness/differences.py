@@ -17,6 +17,7 @@ from harness.analysis.invariants import Matching, match
 from harness.analysis.mechanism import Mechanism
 from harness.analysis.problem import Problem, Seen, State
 from harness.analysis.recipes import Recipe
+from harness.analysis.screws import finite_steps
 from harness.description.dh import Convention
 from harness.operands import TIP, Operand, matched
 from harness.se3 import Array
@@ -91,7 +92,7 @@ def _configurations(prismatic: Sequence[bool]) -> Array:
     """Random ones, whole turns and half a metre; then zero and one finite step of each joint, as the search wants them."""
     reach = np.where(prismatic, SLIDE, math.pi)
     q = np.random.default_rng(0).uniform(-reach, reach, (FITTED + CHECKED, len(reach)))
-    return np.concatenate([q, np.zeros((1, len(reach))), np.diag(np.where(prismatic, 0.1, 1.0))])
+    return np.concatenate([q, np.zeros((1, len(reach))), np.diag(finite_steps(prismatic))])
 
 
 def _bound(problem: Problem) -> tuple[float, float] | None:

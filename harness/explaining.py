@@ -14,6 +14,7 @@ from harness.analysis.explain import explain, shown
 from harness.analysis.first_difference import first_difference
 from harness.analysis.problem import FAITHFUL, Problem, Seen, State
 from harness.analysis.recipes import Recipe, TableRecipe, UrdfRecipe
+from harness.analysis.screws import finite_steps
 from harness.binding import Bound
 from harness.description.model import RobotModel
 from harness.engines.registry import kind_of
@@ -64,7 +65,7 @@ def configurations(model: RobotModel) -> Array:
     rng = np.random.default_rng(0)
     law = model.configurations
     q = rng.uniform(law.lower, law.upper, (FITTED + CHECKED, len(law.lower)))
-    steps = np.diag(np.where(law.revolute, 1.0, 0.1))
+    steps = np.diag(finite_steps([not turns for turns in law.revolute]))
     return np.concatenate([q, np.zeros((1, len(law.lower))), steps])
 
 

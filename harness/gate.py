@@ -86,9 +86,9 @@ def describe(source: doc.Source) -> str:
     if source.verdict == "keeps state" and source.validity is not None and source.validity.again_at is not None:
         v, at = source.validity, source.validity.again_at
         return f"its answer for {at.label} changed by {v.again:.2g} when asked again: it depends on what was asked before"
-    worst = next(f for f in source.frames if f.frame == source.worst_frame)
-    failing = [f for f in source.frames if f.verdict not in ("agrees", "accepted")]
-    if worst.verdict in ("agrees", "accepted"):
+    worst = source.worst
+    failing = [f for f in source.frames if not f.passes]
+    if worst.passes:
         worst = failing[0]
     if worst.verdict == "not certified":
         why = source.certificate.reason if source.certificate else "no certificate was made"

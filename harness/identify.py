@@ -11,6 +11,7 @@ import numpy as np
 from harness.analysis.align import chain_screws
 from harness.analysis.canonical import canonical
 from harness.analysis.invariants import Difference, Matching, match
+from harness.analysis.screws import finite_steps
 from harness.description.dh import DHRow
 from harness.description.locate import model_folders
 from harness.engines.packaged_tables import packaged_tables
@@ -57,7 +58,7 @@ def rows_of(operand: Operand) -> tuple[DHRow, ...] | str:
     """Standard canonical rows of a mechanism, axes that are nearly parallel taken for parallel; or why there are none."""
     n = len(operand.joints)
     mechanism = operand.recipe(operand.joints, {j: j for j in operand.joints}, False).mechanism
-    q = np.concatenate([np.zeros((1, n)), np.diag(np.where(operand.prismatic, 0.1, 1.0))])
+    q = np.concatenate([np.zeros((1, n)), np.diag(finite_steps(operand.prismatic))])
     prismatic = list(operand.prismatic)
     try:
         screws = chain_screws(mechanism.placements(q, (TIP,))[:, 0], prismatic)

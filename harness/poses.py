@@ -27,16 +27,14 @@ def pose_all(results: Results) -> dict[str, Posed]:
 
 def _posed(results: Results, comparison: Comparison, participant: Participant) -> Posed | None:
     reference = results.participants[0]
-    streams = (comparison.position[participant.name], comparison.rotation[participant.name])
-    limits = pair_tolerance(participant.planned, reference.planned)
-    over = np.array([stream.max / limit for stream, limit in zip(streams, limits, strict=True)])
-    which, frame = np.unravel_index(int(over.argmax()), over.shape)
-    index = int(streams[which].argmax[frame])
-    if index < 0:
+    tolerance = pair_tolerance(participant.planned, reference.planned)
+    where = comparison.furthest(participant.name, tolerance, range(len(results.model.frames.frames)))
+    if where is None:
         return None
+    frame, index = where
     q = results.model.configurations.one(results.options.seed, index)[None, :]
     a, b = reference.running().mapped(q), participant.running().mapped(q)
     placements = {i: (a[i][0], b[i][0]) for i in a if i in b}
     if not all(np.isfinite(T).all() for pair in placements.values() for T in pair):
         return None
-    return Posed(index, int(frame), placements)
+    return Posed(index, frame, placements)

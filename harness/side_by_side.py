@@ -5,14 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from harness.analysis.align import chain_screws
 from harness.analysis.canonical import canonical
 from harness.analysis.mechanism import Mechanism
+from harness.analysis.screws import finite_steps
 from harness.description.dh import Convention, DHRow
 from harness.se3 import Array
+
+Unit = Literal["m", "rad"]
+COLUMNS: tuple[tuple[str, Unit], ...] = (("a", "m"), ("alpha", "rad"), ("d", "m"), ("theta", "rad"))
+
+
+def less(b: float, a: float, unit: Unit) -> float:
+    """b - a; an angle within half a turn."""
+    return b - a if unit == "m" else math.remainder(b - a, 2.0 * math.pi)
 
 
 @dataclass(frozen=True)
@@ -28,7 +38,7 @@ class Side:
 def canonical_side(mechanism: Mechanism, convention: Convention, tip: str) -> Side:
     """The canonical table of a mechanism up to the frame `tip`, from n + 1 placements."""
     n, prismatic = len(mechanism.joints), list(mechanism.prismatic)
-    q = np.concatenate([np.zeros((1, n)), np.diag(np.where(prismatic, 0.1, 1.0))])
+    q = np.concatenate([np.zeros((1, n)), np.diag(finite_steps(prismatic))])
     screws = chain_screws(mechanism.placements(q, (tip,))[:, 0], prismatic)
     try:
         form = canonical(screws, prismatic, convention, list(mechanism.joints))
@@ -46,7 +56,7 @@ def turned(a: Sequence[DHRow], b: Sequence[DHRow], convention: Convention) -> li
     for i in range(len(rows) - 1):
         along = i if convention == "standard" else i + 1
         one, other = a[along], rows[along]
-        turns = [_apart(one.a, other.a * s) + abs(math.remainder(one.alpha - other.alpha * s, 2.0 * math.pi)) for s in (1, -1)]
+        turns = [abs(one.a - other.a * s) + abs(math.remainder(one.alpha - other.alpha * s, 2.0 * math.pi)) for s in (1, -1)]
         if abs(turns[0] - turns[1]) < 1e-7:
             gaps = [abs(math.remainder(a[i].theta - rows[i].theta - half, 2.0 * math.pi)) for half in (0.0, math.pi)]
             turns = gaps if a[i].kind == "revolute" else [0.0, 1.0]
@@ -55,7 +65,3 @@ def turned(a: Sequence[DHRow], b: Sequence[DHRow], convention: Convention) -> li
             rows[i] = replace(rows[i], theta=rows[i].theta + math.pi)
             rows[i + 1] = replace(rows[i + 1], theta=rows[i + 1].theta - math.pi)
     return rows
-
-
-def _apart(x: float, y: float) -> float:
-    return abs(x - y)

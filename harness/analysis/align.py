@@ -12,7 +12,7 @@ from harness.analysis.invariants import match, zero_offsets
 from harness.analysis.mechanism import Parameter
 from harness.analysis.problem import Knob, State
 from harness.analysis.recipes import TableRecipe, mixed
-from harness.analysis.screws import ANGLE_STEP, LENGTH_STEP, Screws, fit_gauge, log
+from harness.analysis.screws import Screws, finite_steps, fit_gauge, log
 from harness.se3 import Array
 
 PARALLEL = 1e-3
@@ -46,7 +46,7 @@ def aligned(state: State) -> State | None:
 
 def chain_screws(T: Array, prismatic: list[bool]) -> Screws:
     """Screws from the placements (n + 1, 4, 4) at zero and after one step of each joint."""
-    steps = np.where(prismatic, LENGTH_STEP, ANGLE_STEP)
+    steps = finite_steps(prismatic)
     S = np.array([log(T[i + 1] @ se3.inverse(T[0])) / steps[i] for i in range(len(prismatic))]).reshape(-1, 6)
     return Screws(T[0], S, 0.0)
 

@@ -184,7 +184,13 @@ class Comparison:
 
     def worst(self, source: str, tolerance: tuple[float, float], frames: Sequence[int]) -> tuple[int, int] | None:
         """(frame, configuration index) furthest outside tolerance (m, rad) among `frames`, None if all are inside."""
-        best, where = 1.0, None
+        return self.furthest(source, tolerance, frames, 1.0)
+
+    def furthest(
+        self, source: str, tolerance: tuple[float, float], frames: Sequence[int], above: float = -1.0
+    ) -> tuple[int, int] | None:
+        """(frame, configuration index) with the largest discrepancy, in parts of the tolerance and `above` so many of them."""
+        best, where = above, None
         for stream, limit in ((self.position[source], tolerance[0]), (self.rotation[source], tolerance[1])):
             for frame in frames:
                 if (ratio := float(stream.max[frame]) / limit) > best:

@@ -8,7 +8,7 @@ import numpy as np
 
 from harness import se3
 from harness.analysis.problem import Problem
-from harness.analysis.screws import ANGLE_STEP, LENGTH_STEP, log, rebuild
+from harness.analysis.screws import finite_steps, log, rebuild
 from harness.se3 import Array
 
 NOTICED = 1e-9
@@ -17,7 +17,7 @@ NOTICED = 1e-9
 def first_difference(problem: Problem, joints: tuple[str, ...], prismatic: tuple[bool, ...]) -> str:
     """In words. problem.check must end with q = 0 and one step of each joint, as `explaining.configurations` makes it."""
     n, frame = len(joints), problem.fitted[-1]
-    steps = np.where(prismatic, LENGTH_STEP, ANGLE_STEP)
+    steps = finite_steps(prismatic)
     chains = []
     for T in (problem.check.a, problem.check.b):
         placed = T[:, frame]

@@ -8,7 +8,7 @@ The step is finite, not infinitesimal: for a joint it is exact. Twists are linea
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -68,13 +68,18 @@ def log(T: Array) -> Array:
     return np.concatenate([V_inverse @ p, axis * angle])
 
 
+def finite_steps(prismatic: Sequence[bool]) -> Array:
+    """The step (n,) of each joint from which its screw is read [rad or m]."""
+    return np.where(prismatic, LENGTH_STEP, ANGLE_STEP)
+
+
 def screws(chain: Chain, prismatic: list[bool], rng: np.random.Generator) -> Screws:
     """Joint screws of a chain of which only placements are known, and how well they rebuild it.
 
     prismatic: which joints slide (their step is 0.1 m, else 1 rad).
     """
     n = len(prismatic)
-    steps = np.where(prismatic, LENGTH_STEP, ANGLE_STEP)
+    steps = finite_steps(prismatic)
     T = chain(np.concatenate([np.zeros((1, n)), np.diag(steps)]))
     M, M_inverse = T[0], se3.inverse(T[0])
     S = np.array([log(T[i + 1] @ M_inverse) / steps[i] for i in range(n)]).reshape(n, 6)

@@ -8,6 +8,7 @@ from dataclasses import replace
 from harness.crosscheck import crosscheck
 from harness.description.model import RobotModel
 from harness.errors import CrosscheckError
+from harness.gate import FAILING
 from harness.mutation.controller import NAMES, FaultyWorkers
 from harness.mutation.effect import Effect, effect_of
 from harness.mutation.equivalent import equivalents, with_follower
@@ -23,7 +24,6 @@ from harness.sources import deviation_on_file
 
 SAMPLES = 200
 NOTHING = 1e-13  # an effect below is none: rounding of the models
-FAILING = ("disagrees", "invalid placements", "keeps state")
 
 
 def mutants_of(model: RobotModel) -> Iterator[Mutant]:

@@ -13,16 +13,26 @@ from typing import Literal
 from pydantic import ValidationError
 
 from harness.errors import InputError
-from harness.report.document import Report, Source
+from harness.report.document import PublishedResult, Report, Source
 from harness.report.parts import NonNegative, Part
-from harness.report.regression import Changed, Moved, Regression
-from harness.report.text import moved_text
+from harness.report.regression import Changed, Moved, Quantity, Regression
+from harness.report.text import changed_text, moved_text
 
 FOLDER = "accepted"
-Setting = Literal["reference", "fixed", "samples", "seed"]
 Pair = tuple[NonNegative, NonNegative]  # position [m], rotation [rad]
 BOUND = 50.0  # times the noise floor: a bound multiplies rounding by the Lebesgue constant of its grid, about 20 for six joints
-PASSING = ("reference", "agrees", "agrees as accepted")  # verdicts that pass
+SEEN: tuple[Quantity, Quantity] = ("position", "rotation")
+PROVEN: tuple[Quantity, Quantity] = ("position, for all q", "rotation, for all q")
+UNITS: tuple[Literal["m", "rad"], ...] = ("m", "rad")
+
+
+class Conditions(Part):
+    """What must be the same for numbers to be comparable; fewer samples are a part of more."""
+
+    reference: str
+    fixed: int
+    samples: int
+    seed: int
 
 
 class AcceptedSource(Part):
@@ -34,14 +44,14 @@ class AcceptedSource(Part):
 
 
 class AcceptedNumbers(Part):
-    """The whole file. What must be the same for numbers to be comparable is in `settings`."""
+    """The whole file."""
 
     format: Literal["fk-crosscheck accepted"] = "fk-crosscheck accepted"
     version: Literal["1.0"] = "1.0"
     robot: str
     accepted: str
     verdict: str
-    settings: dict[Setting, str]
+    settings: Conditions
     inputs: dict[str, str]
     published: dict[str, str]
     sources: dict[str, AcceptedSource]
@@ -55,7 +65,7 @@ def accepted_from(report: Report) -> AcceptedNumbers:
         verdict=_gate(report),
         settings=_settings(report),
         inputs=dict(sorted(report.robot.hashes.items())),
-        published={f"{p.configuration}, DH frame {p.frame} in {p.relative_to}": p.found for p in report.published},
+        published={_claim(p): p.found for p in report.published},
         sources={s.name: _numbers(s) for s in report.sources if s.status == "ran" and not s.reference},
     )
 
@@ -91,14 +101,14 @@ def since(numbers: AcceptedNumbers, report: Report, strict: bool) -> Regression:
     """What moved from the numbers on file to this report."""
     now, before = _settings(report), numbers.settings
     # Random configurations are numbered: with fewer of them the first ones are looked at again, and what grows there has grown.
-    fewer = now["samples"].isdigit() and before["samples"].isdigit() and int(now["samples"]) < int(before["samples"])
-    other = [f"{k}: {before[k]}, now {v}" for k, v in now.items() if before[k] != v and not (k == "samples" and fewer)]
+    fewer = now.samples < before.samples
+    other = [f"{k}: {getattr(before, k)}, now {v}" for k, v in now if getattr(before, k) != v and not (k == "samples" and fewer)]
     moved = [] if other else list(_moved(numbers, report))
     return Regression(
         accepted=numbers.accepted,
         problem=f"accepted with other settings ({'; '.join(other)})" if other else "",
-        note=f"looked at {now['samples']} of the {before['samples']} random configurations accepted" if fewer else "",
-        moved=[m for m in moved if m.after > m.before or "all q" in m.quantity] if fewer else moved,
+        note=f"looked at {now.samples} of the {before.samples} random configurations accepted" if fewer else "",
+        moved=[m for m in moved if m.after > m.before or m.quantity in PROVEN] if fewer else moved,
         changed=list(_changed(numbers, report)),
         strict=strict,
     )
@@ -112,27 +122,32 @@ def compared(report: Report, numbers: AcceptedNumbers, strict: bool) -> Report:
         return report
     reasons = worsened(found)
     old = report.verdict
-    sentence = old.sentence if old.exit_code == 1 else f"{report.robot.name} MOVED since it was accepted: {reasons[0]}"
-    verdict = old.model_copy(update={"exit_code": 1, "sentence": sentence, "reasons": [*old.reasons, *reasons]})
-    if old.exit_code != 1:
-        verdict = verdict.model_copy(update={"reasons": [*reasons, *old.reasons]})
-    return report.model_copy(update={"verdict": verdict})
+    if old.exit_code == 1:
+        update: dict[str, object] = {"reasons": [*old.reasons, *reasons]}
+    else:
+        sentence = f"{report.robot.name} MOVED since it was accepted: {reasons[0]}"
+        update = {"exit_code": 1, "sentence": sentence, "reasons": [*reasons, *old.reasons]}
+    return report.model_copy(update={"verdict": old.model_copy(update=update)})
 
 
 def worsened(found: Regression) -> list[str]:
     """What a strict run fails for, a line each."""
     lines = [found.problem] if found.problem else []
     lines += [moved_text(m) for m in found.grown]
-    return lines + [f"{c.what}: {c.before}, now {c.after}" for c in found.changed if c.worse]
+    return lines + [changed_text(c) for c in found.changed if c.worse]
 
 
 def _gate(report: Report) -> str:
     return {0: "passes", 1: "fails", 3: "incomplete"}[report.verdict.exit_code]
 
 
-def _settings(report: Report) -> dict[Setting, str]:
+def _settings(report: Report) -> Conditions:
     s = report.settings
-    return {"reference": s.reference, "fixed": str(s.fixed), "samples": str(s.samples), "seed": str(s.seed)}
+    return Conditions(reference=s.reference, fixed=s.fixed, samples=s.samples, seed=s.seed)
+
+
+def _claim(p: PublishedResult) -> str:
+    return f"{p.configuration}, DH frame {p.frame} in {p.relative_to}"
 
 
 def _numbers(source: Source) -> AcceptedSource:
@@ -155,16 +170,14 @@ def _moved(numbers: AcceptedNumbers, report: Report) -> Iterator[Moved]:
         if known is None:
             continue
         new = _numbers(source)
-        for suffix, before, after in (("", known.frames, new.frames), (", for all q", known.bounds, new.bounds)):
-            floor = source.floor * (BOUND if suffix else 1.0)
+        for quantities, before, after, floor in (
+            (SEEN, known.frames, new.frames, source.floor),
+            (PROVEN, known.bounds, new.bounds, BOUND * source.floor),
+        ):
             for frame in (f for f in before if f in after):
-                for i, (quantity, unit) in enumerate((("position", "m"), ("rotation", "rad"))):
-                    a, b = before[frame][i], after[frame][i]
+                for what, unit, a, b in zip(quantities, UNITS, before[frame], after[frame], strict=True):
                     if abs(b - a) > floor:
-                        yield Moved.model_validate(
-                            {"source": source.name, "frame": frame, "quantity": quantity + suffix, "unit": unit}
-                            | {"before": a, "after": b, "floor": floor}
-                        )
+                        yield Moved(source=source.name, frame=frame, quantity=what, unit=unit, before=a, after=b, floor=floor)
 
 
 def _changed(numbers: AcceptedNumbers, report: Report) -> Iterator[Changed]:
@@ -176,7 +189,7 @@ def _changed(numbers: AcceptedNumbers, report: Report) -> Iterator[Changed]:
     for name in (name for name in numbers.inputs if name not in report.robot.hashes):
         yield Changed(what=name, before=numbers.inputs[name][:12], after="not there")
     yield from _sources_changed(numbers, report)
-    claims = {f"{p.configuration}, DH frame {p.frame} in {p.relative_to}": p for p in report.published}
+    claims = {_claim(p): p for p in report.published}
     for text, found in numbers.published.items():
         if text in claims and claims[text].found != found:
             worse = claims[text].found != claims[text].status
@@ -189,10 +202,10 @@ def _sources_changed(numbers: AcceptedNumbers, report: Report) -> Iterator[Chang
         known = numbers.sources.get(name)
         if known is None:
             if source.status == "ran":
-                yield Changed(what=name, before="not there", after=source.verdict, worse=source.verdict not in PASSING)
+                yield Changed(what=name, before="not there", after=source.verdict, worse=not source.passes)
             continue
         if known.verdict != source.verdict:
-            yield Changed(what=name, before=known.verdict, after=source.verdict, worse=source.verdict not in PASSING)
+            yield Changed(what=name, before=known.verdict, after=source.verdict, worse=not source.passes)
         # What is not compared any more is not seen to grow: that is worse than growing.
         frames = {f.frame for f in source.frames}
         for frame in (f for f in known.frames if f not in frames and source.status == "ran"):

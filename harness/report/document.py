@@ -51,6 +51,16 @@ class Source(Part):
     pose: Pose | None = None
     certificate: Certificate | None = None
 
+    @property
+    def passes(self) -> bool:
+        """Whether its verdict is a good one."""
+        return self.verdict in ("reference", "agrees", "agrees as accepted")
+
+    @property
+    def worst(self) -> FrameResult:
+        """The frame that is furthest off, over the tolerance. Raises StopIteration if none was compared."""
+        return next(f for f in self.frames if f.frame == self.worst_frame)
+
 
 class Frame(Part):
     """One mapped frame. `offset` is T_dh_frame: declared, or if rigid the mean over all configurations (a lattice of 1021)."""

@@ -12,8 +12,6 @@ from rich.text import Text
 from harness.report.document import Report, Source
 from harness.report.text import metres, plain
 
-GOOD = ("reference", "agrees", "agrees as accepted")
-
 
 def show_engine_table(reports: Sequence[Report], console: Console) -> None:
     """Print one row an engine; robots are named where it did anything but agree."""
@@ -27,7 +25,8 @@ def show_engine_table(reports: Sequence[Report], console: Console) -> None:
     for name, entries in by_engine.items():
         counts = Counter(source.verdict for _, source in entries)
         verdict = ", ".join(f"{count} {text}" for text, count in counts.items())
-        style = "green" if set(counts) <= set(GOOD) else "yellow" if set(counts) <= {*GOOD, "not run"} else "red"
+        bad = {source.verdict for _, source in entries if not source.passes}
+        style = "red" if bad - {"not run"} else "yellow" if bad else "green"
         cells = (name, _versions(entries), verdict, _largest(entries), _notes(entries))
         table.add_row(*(Text(plain(cell), style=style if cell is verdict else "") for cell in cells))
     console.print(table)
@@ -56,7 +55,7 @@ def _notes(entries: Sequence[tuple[Report, Source]]) -> str:
     """Each reason why it did not run or did not agree, with the robots it holds for."""
     robots: dict[str, list[str]] = {}
     for report, source in entries:
-        if source.verdict not in GOOD:
+        if not source.passes:
             robots.setdefault(source.reason or f"{source.verdict} at {source.worst_frame}", []).append(report.robot.name)
     total = len(entries)
     return "; ".join(why if len(names) == total else f"{why} ({','.join(names)})" for why, names in robots.items())

@@ -15,7 +15,7 @@ from harness.report.document import Report, Source
 from harness.report.pose import FramePair, Pose
 from harness.report.source_parts import Statistics
 from harness.report.text import metres, plain, radians
-from harness.se3 import Array
+from harness.se3 import Array, position_error, rotation_error
 
 REFERENCE, SOURCE = "#0072B2", "#D55E00"
 TRIAD = (("x", "#CC3311"), ("y", "#009E73"), ("z", "#56B4E9"))
@@ -73,9 +73,8 @@ def _extent(T: Array) -> float:
 def _factor(pose: Pose) -> float:
     """The power of ten that makes the largest difference visible; 1 if it is, or if there is none."""
     T_a, T_b = _placements(pose)
-    position = float(np.linalg.norm(T_a[:, :3, 3] - T_b[:, :3, 3], axis=1).max()) / (SEEN * _extent(T_a))
-    rotation = max(float(np.linalg.norm(_rotation_vector(a.T @ b))) for a, b in zip(T_a[:, :3, :3], T_b[:, :3, :3], strict=True))
-    largest = max(position, rotation / TURNED)
+    position, rotation = position_error(T_a, T_b).max(), rotation_error(T_a, T_b).max()
+    largest = float(max(position / (SEEN * _extent(T_a)), rotation / TURNED))
     return 10.0 ** max(0, math.floor(-math.log10(largest))) if 0.0 < largest < 1.0 else 1.0
 
 
@@ -112,7 +111,9 @@ def _traces(pose: Pose, reference: str, source: str, factor: float) -> list[Figu
     names = [letters(f.frame) for f in pose.frames]
     off = [apart(f) for f in pose.frames]
     T_b = T_b if factor == 1.0 else _magnified(T_a, T_b, factor)
-    shown = _merged(names, T_a[:, :3, 3], 0.5 * size)
+    shown = [""] * len(names)
+    for group in in_one_place(T_a[:, :3, 3], 0.5 * size):  # one label for frames that stand in one place
+        shown[group[0]] = ", ".join(names[i] for i in group)
     return [
         _skeleton(T_a, reference, REFERENCE, "solid", "circle", shown, [f"{n}: {letters(reference)}" for n in names]),
         _skeleton(
@@ -127,22 +128,19 @@ def _traces(pose: Pose, reference: str, source: str, factor: float) -> list[Figu
 def apart(pair: FramePair) -> str:
     """`0.301 mm, 1.1e-11 rad`: how far apart the two placements of a frame are."""
     T_a, T_b = np.array(pair.reference), np.array(pair.source)
-    rotation = float(np.linalg.norm(_rotation_vector(T_a[:3, :3].T @ T_b[:3, :3])))
-    return f"{metres(float(np.linalg.norm(T_a[:3, 3] - T_b[:3, 3])))}, {radians(rotation)}"
+    return f"{metres(float(position_error(T_a, T_b)))}, {radians(float(rotation_error(T_a, T_b)))}"
 
 
-def _merged(names: list[str], points: Array, gap: float) -> list[str]:
-    """One label for frames that stand in one place."""
-    labels = [""] * len(names)
-    heads: list[int] = []
-    for i, name in enumerate(names):
-        head = next((h for h in heads if np.linalg.norm(points[h] - points[i]) < gap), None)
-        if head is None:
-            heads.append(i)
-            labels[i] = name
+def in_one_place(points: Array, gap: float) -> list[list[int]]:
+    """Indices of points (N, 3) in groups: each with the first point that is nearer than `gap`."""
+    groups: list[list[int]] = []
+    for i, point in enumerate(points):
+        group = next((g for g in groups if np.linalg.norm(points[g[0]] - point) < gap), None)
+        if group is None:
+            groups.append([i])
         else:
-            labels[head] += f", {name}"
-    return labels
+            group.append(i)
+    return groups
 
 
 def _rounded(values: Array) -> list[float]:
@@ -182,7 +180,7 @@ def distribution(report: Report) -> list[Figure]:
     traces = []
     sources = [s for s in report.sources if s.frames]
     for i, source in enumerate(sources):
-        frame = next(f for f in source.frames if f.frame == source.worst_frame)
+        frame = source.worst
         for axis, statistics in (("", frame.position), ("2", frame.rotation)):
             traces.append(_bars(source, statistics, i, axis, visible=i < len(BARS)))
     return traces

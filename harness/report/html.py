@@ -21,6 +21,7 @@ from harness.report.model_parts import Link, ParameterPair
 from harness.report.source_parts import FrameResult
 from harness.report.text import (
     change_of,
+    changed_text,
     degrees,
     difference,
     for_all,
@@ -37,7 +38,6 @@ from harness.report.text import (
 _SCALE = ("#ffffe5", "#fff7bc", "#fee391", "#fec44f", "#fe9929", "#ec7014", "#cc4c02", "#993404", "#662506")
 LOWEST, HIGHEST = -16.0, -1.0
 TINY = 1e-300
-GOOD = ("agrees", "agrees as accepted", "accepted", "reference")
 
 
 class Cell(NamedTuple):
@@ -58,10 +58,9 @@ def _environment() -> Environment:
     )
     env.filters.update(
         metres=metres, radians=radians, numbers=numbers, colour=colour, for_all=for_all, quantity=quantity, difference=difference,
-        change_of=change_of, moved=moved_text, apart=apart, point=point,
+        change_of=change_of, moved=moved_text, changed=changed_text, apart=apart, point=point,
         degrees=degrees,
     )  # fmt: skip
-    env.tests["failing"] = lambda verdict: verdict not in GOOD
     return env
 
 
@@ -114,7 +113,7 @@ def render_index(reports: Sequence[Report]) -> str:
 
 def failing(report: Report) -> list[Source]:
     """The sources that do not pass, those that disagree first."""
-    bad = [s for s in report.sources if s.verdict not in GOOD and (s.required or s.status != "not run")]
+    bad = [s for s in report.sources if not s.passes and (s.required or s.status != "not run")]
     return sorted(bad, key=lambda s: s.verdict in ("not run", "failed"))
 
 

@@ -46,7 +46,7 @@ def _not_run(report: Report, source: Source) -> TestCase:
 
 def _frame(report: Report, source: Source, frame: FrameResult) -> TestCase:
     case = _case(report, frame.frame, source.name)
-    if frame.verdict in ("agrees", "accepted"):
+    if frame.passes:
         return case
     failure = Failure(
         plain(f"{frame.verdict}: {metres(frame.position.max)}, {radians(frame.rotation.max)} from {report.settings.reference}")

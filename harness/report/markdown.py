@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from harness.report.document import Report, Source
-from harness.report.text import difference, for_all, metres, moved_text, numbers, plain, radians, why
+from harness.report.text import changed_text, difference, for_all, metres, moved_text, numbers, plain, radians, why
 
 _ENTITY = {"<": "&lt;", ">": "&gt;", "&": "&amp;"}
 MARK = {0: "PASS", 1: "FAIL", 3: "INCOMPLETE"}
@@ -16,8 +16,7 @@ SOURCES, CAUSES, OTHERS = 18, 12, 4
 def render_markdown(report: Report) -> str:
     """The report as Markdown text."""
     compared = [source for source in report.sources if not source.reference]
-    passing = ("agrees", "agrees as accepted")
-    ranked = sorted(compared, key=lambda s: (s.verdict in passing, s.status != "ran" and not s.required))
+    ranked = sorted(compared, key=lambda s: (s.passes, s.status != "ran" and not s.required))
     lines = [
         f"## {MARK[report.verdict.exit_code]}: {_md(report.robot.name)}",
         "",
@@ -44,7 +43,7 @@ def render_markdown(report: Report) -> str:
 def _row(source: Source) -> str:
     if not source.frames:
         return f"| {_code(source.name)} | {source.status} | | | | | | {_md(source.reason)} |"
-    frame = next(f for f in source.frames if f.frame == source.worst_frame)
+    frame = source.worst
     tolerance = f"{metres(source.tolerance.position)}, {radians(source.tolerance.rotation)}"
     return (
         f"| {_code(source.name)} | {source.verdict} | {_md(frame.frame)} | {metres(frame.position.max)} | "
@@ -55,7 +54,7 @@ def _row(source: Source) -> str:
 def _disagreements(report: Report) -> list[str]:
     lines = []
     for source in report.sources:
-        failing = [f for f in source.frames if f.verdict not in ("agrees", "accepted")]
+        failing = [f for f in source.frames if not f.passes]
         if not failing:
             continue
         first = f"first {_md(source.first_disagreeing_frame)}" if source.first_disagreeing_frame else ""
@@ -95,7 +94,7 @@ def _since(report: Report) -> list[str]:
     counts = f"{len(g.grown)} numbers grew, {len(g.moved) - len(g.grown)} shrank, {len(g.changed)} things changed"
     head = f"- since {_md(g.accepted)}: {counts}{note}"
     worst = sorted(g.moved, key=lambda m: m.before - m.after)
-    changed = [f"  - {_md(f'{c.what}: {c.before}, now {c.after}')}" for c in sorted(g.changed, key=lambda c: not c.worse)]
+    changed = [f"  - {_md(changed_text(c))}" for c in sorted(g.changed, key=lambda c: not c.worse)]
     return [head, *changed[:1], *(f"  - {_md(moved_text(m))}" for m in worst), *changed[1:]]
 
 

@@ -6,13 +6,15 @@ from typing import Literal
 
 from harness.report.parts import NonNegative, Part
 
+Quantity = Literal["position", "rotation", "position, for all q", "rotation, for all q"]
+
 
 class Moved(Part):
     """A number that differs from the accepted one by more than the source's noise floor [m or rad]."""
 
     source: str
     frame: str
-    quantity: Literal["position", "rotation", "position, for all q", "rotation, for all q"]
+    quantity: Quantity
     unit: Literal["m", "rad"]
     before: NonNegative
     after: NonNegative

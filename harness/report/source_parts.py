@@ -60,6 +60,11 @@ class FrameResult(Part):
     noise: str
     accepted: Accepted | None = None
 
+    @property
+    def passes(self) -> bool:
+        """Whether its verdict is a good one."""
+        return self.verdict in ("agrees", "accepted")
+
 
 class Reproducer(Part):
     """The worst configuration of a source, shrunk: joints set to zero while the frame still disagrees."""

@@ -7,7 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from harness.report.document import Report, Source
-from harness.report.text import for_all, metres, moved_text, numbers, plain, radians, why
+from harness.report.text import changed_text, for_all, metres, moved_text, numbers, plain, radians, why
 
 _STYLE = {0: "bold green", 1: "bold red", 3: "bold yellow"}
 MAX_REASONS = 6
@@ -64,20 +64,19 @@ def _since(report: Report, console: Console) -> None:
         style = "red" if moved.after > moved.before else ""
         console.print(Text(plain(f"  since {g.accepted}: {moved_text(moved)}"), style=style), soft_wrap=True)
     for change in g.changed[:MAX_MOVED]:
-        text = plain(f"  since {g.accepted}: {change.what}: {change.before}, now {change.after}")
+        text = plain(f"  since {g.accepted}: {changed_text(change)}")
         console.print(Text(text, style="red" if change.worse else ""), soft_wrap=True)
     if (more := max(0, len(g.moved) - MAX_MOVED) + max(0, len(g.changed) - MAX_MOVED)) > 0:
         console.print(Text(f"  and {more} more changes in the report"))
 
 
 def _row(source: Source) -> tuple[Text, ...]:
-    good = source.verdict in ("agrees", "agrees as accepted", "reference")
-    verdict = Text(source.verdict, style="green" if good else "yellow" if source.verdict == "not run" else "red")
+    verdict = Text(source.verdict, style="green" if source.passes else "yellow" if source.verdict == "not run" else "red")
     name = Text(plain(source.name))
     if not source.frames:
         install = f" ({source.install})" if source.install else ""
         return name, verdict, *(Text("") for _ in range(5)), Text(plain(source.reason + install))
-    frame = next(f for f in source.frames if f.frame == source.worst_frame)
+    frame = source.worst
     return (
         name,
         verdict,
@@ -94,7 +93,7 @@ def _causes(report: Report, console: Console) -> None:
     """Why sources disagree; those with the same cause together."""
     groups: dict[tuple[str, ...], list[str]] = {}
     for source in report.sources:
-        if source.explanation and source.verdict not in ("agrees", "agrees as accepted"):
+        if source.explanation and not source.passes:
             groups.setdefault(tuple(line for line in why(source) if not line.startswith("  tried")), []).append(source.name)
     for lines, names in groups.items():
         for i, text in enumerate(lines):
@@ -105,7 +104,7 @@ def _causes(report: Report, console: Console) -> None:
 
 def _located(source: Source, reference: str, console: Console) -> None:
     """The frame, the configuration and the evidence of one disagreement."""
-    if source.verdict in ("agrees", "agrees as accepted", "reference"):
+    if source.passes:
         return
     if source.first_disagreeing_frame:
         console.print(

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 from harness.report.document import Source
 from harness.report.model_parts import ParameterPair
-from harness.report.regression import Moved
+from harness.report.regression import Changed, Moved
 
 MAX_SAME = 3
 
@@ -57,6 +57,11 @@ def moved_text(moved: Moved) -> str:
     """`urdf:pinocchio at tool0: position 1e-12 m, now 0.301 mm`."""
     before, after = quantity(moved.before, moved.unit), quantity(moved.after, moved.unit)
     return f"{moved.source} at {moved.frame}: {moved.quantity} {before}, now {after}"
+
+
+def changed_text(changed: Changed) -> str:
+    """`urdf:pinocchio: agrees, now disagrees`."""
+    return f"{changed.what}: {changed.before}, now {changed.after}"
 
 
 def numbers(values: Iterable[float], digits: int = 6) -> str:

@@ -40,38 +40,35 @@ class Meshes:
         if model.urdf is None:
             self.note = "the model has no URDF"
             return
-        missing: list[str] = []
+        file, missing = Path(model.urdf.path), list[str]()
 
         def handler(fname: str, **_: Any) -> str:
-            path = mesh_path(fname, Path(model.urdf.path) if model.urdf else Path())
+            path = mesh_path(fname, file)
             if path is None:
                 missing.append(fname)
-                return fname
-            return str(path)
+            return str(path or fname)
+
+        def why(otherwise: str) -> str:
+            return f"{len(missing)} mesh files are not here, e.g. {missing[0]}" if missing else otherwise
 
         try:
             yourdfpy = importlib.import_module("yourdfpy")
             extras = importlib.import_module("viser.extras")
             with contextlib.redirect_stdout(io.StringIO()):
                 self._urdf = yourdfpy.URDF.load(
-                    str(model.urdf.path), filename_handler=handler, load_meshes=True, build_scene_graph=True, force_mesh=True
+                    str(file), filename_handler=handler, load_meshes=True, build_scene_graph=True, force_mesh=True
                 )
             self._frame = server.scene.add_frame("/meshes", show_axes=False)
             self._shown = extras.ViserUrdf(server, self._urdf, root_node_name="/meshes", mesh_color_override=GLASS)
         except Exception as error:  # a picture is missing; what is compared is not
-            found = (
-                f"{len(missing)} mesh files are not here, e.g. {missing[0]}" if missing else f"{type(error).__name__}: {error}"
-            )
-            self.note = f"no meshes: {found}"
+            self.note = f"no meshes: {why(f'{type(error).__name__}: {error}')}"
             return
         if self._urdf.scene is None or not self._urdf.scene.geometry:
-            self.note = (
-                f"{len(missing)} mesh files are not here, e.g. {missing[0]}" if missing else "the URDF has no visual geometry"
-            )
+            self.note = why("the URDF has no visual geometry")
 
     def move(self, q: Array) -> None:
         """Set joints to q (n,); everything is drawn in the base frame, so the meshes are moved to where it is in the URDF."""
-        if self._shown is None or self._model.urdf is None:
+        if self._shown is None:
             return
         joints = list(self._urdf.actuated_joint_names)
         values = self._model.joint_map("urdf").values(q[None, :], tuple(joints))[0] if joints else np.zeros(0)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from harness.report.figures import in_one_place
 from harness.se3 import Array
 
 # Okabe and Ito: told apart by the colour-blind; each source has a thickness of its own as well.
@@ -40,7 +41,7 @@ class Skeleton:
         self._size = size
         self._scene = server.scene
         self.visible = True
-        self._labels: list[tuple[list[str], Any]] = []
+        self._labels: list[tuple[str, Any]] = []
         self._nodes: list[Any] = []
         self._named = named
 
@@ -61,18 +62,11 @@ class Skeleton:
             ),
         ]  # fmt: skip
         if self._named and not self._labels:
-            groups = self._merged(T)
-            self._labels = [(group, self._scene.add_label(f"/labels/{i}", ", ".join(group))) for i, group in enumerate(groups)]
-        for group, label in self._labels:
-            label.position = T[group[0]][:3, 3]
-
-    def _merged(self, T: Mapping[str, Array]) -> list[list[str]]:
-        """One label for frames that stand in one place."""
-        heads: dict[str, list[str]] = {}
-        for name in (name for name in self.frames if name in T):
-            head = next((h for h in heads if np.linalg.norm(T[h][:3, 3] - T[name][:3, 3]) < 1e-6), name)
-            heads.setdefault(head, []).append(name)
-        return list(heads.values())
+            for group in in_one_place(points, 1e-6):
+                text = ", ".join(names[i] for i in group)
+                self._labels.append((names[group[0]], self._scene.add_label(f"/labels/{group[0]}", text)))
+        for name, label in self._labels:
+            label.position = T[name][:3, 3]
 
     def show(self, visible: bool) -> None:
         """Show or hide it."""

@@ -76,7 +76,7 @@ class Session:
         """Why each of the others does not run."""
         return {p.name: p.reason for p in self.results.participants if p.bound is None}
 
-    @property
+    @cached_property
     def frames(self) -> list[str]:
         """Names of the mapped frames in the order of the chain."""
         order = {label: i for i, label in enumerate(self.model.table.frames)}

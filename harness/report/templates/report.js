@@ -102,9 +102,10 @@ function showsWebGL() {
 async function figures() {
   const data = JSON.parse(byId("figures").textContent);
   const plot = byId("skeleton");
+  const inSpace = plot && showsWebGL(); // asked once: each question opens a context, of which a browser has few
   await loadPlotly();
   const redraw = async () => {
-    if (plot && showsWebGL()) {
+    if (inSpace) {
       await drawSkeleton(data.skeletons);
       if (plot.layout) keepPicture(plot);
     }
@@ -112,7 +113,7 @@ async function figures() {
   };
   await redraw();
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
-  if (plot && showsWebGL()) {
+  if (inSpace) {
     byId("skeleton-source").addEventListener("change", redraw);
     byId("skeleton-magnified").addEventListener("change", redraw);
     // What turns under the mouse turns by keyboard as well.
