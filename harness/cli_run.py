@@ -157,7 +157,9 @@ def run(
                 names[model.name] = folder
                 on_file = _on_file(accepted / f"{model.name}.json", strict)
                 with progress_bar(model.name, quiet or as_json) as advance:
-                    report = crosscheck(model, options.reproduced_by(_command(folder, models, options)), advance, workshop)
+                    report = crosscheck(
+                        model, options.reproduced_by(_command(folder, models, options, strict)), advance, workshop
+                    )
                 report = report if on_file is None else compared(report, on_file, strict)
                 write_report(report, out)
                 write_summary(report)
@@ -187,8 +189,8 @@ def _on_file(path: Path, strict: bool) -> AcceptedNumbers | None:
     return read_accepted(path) if strict or path.exists() else None
 
 
-def _command(folder: Path, models: Path | None, options: Options) -> str:
-    """The command line that gives the same numbers."""
+def _command(folder: Path, models: Path | None, options: Options, strict: bool) -> str:
+    """The command line that gives the same numbers, and the same verdict."""
     inside = folder.parent == (models or default_models_dir())
     words = ["crosscheck", "run", folder.name if inside else str(folder)]
     if models is not None and inside:
@@ -201,8 +203,9 @@ def _command(folder: Path, models: Path | None, options: Options) -> str:
     if options.reference != REFERENCE:
         words += ["--reference", options.reference]
     words += ["--samples", str(options.samples), "--seed", str(options.seed)]
-    words += [] if options.certify else ["--no-certify"]
-    return shlex.join(words if options.explain else [*words, "--no-explain"])
+    for option, wanted in (("--no-certify", not options.certify), ("--no-explain", not options.explain), ("--strict", strict)):
+        words += [option] if wanted else []
+    return shlex.join(words)
 
 
 @contextlib.contextmanager

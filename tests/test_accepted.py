@@ -15,6 +15,7 @@ from harness.options import Options
 from harness.report.accepted import accepted_from, accepted_text, compared, read_accepted, since
 from harness.report.document import Report
 from harness.report.html import render_html, render_index
+from harness.report.json_file import read_report
 from harness.report.junit import render_junit
 from harness.report.markdown import render_markdown
 from tests.helpers import crosscheck
@@ -186,6 +187,8 @@ def test_accept_then_strict_then_a_change(cli: Cli, copy_model: Callable[..., Pa
     moved = cli(*run, "--strict")
     assert moved.returncode == 1, moved.stdout
     assert "MOVED since it was accepted" in moved.stdout
+    # What is told to reproduce it fails as well.
+    assert read_report(folder.parent.parent / "reports" / "ur5.json").settings.command.endswith(" --strict")
     assert cli(*run).returncode == 0
 
 
