@@ -69,7 +69,7 @@ def engines(session: nox.Session) -> None:
     session.install(CONSTRAINTS, f"pin=={NEWEST_PIN}", "--editable", ".[all,test]")
     # 3: one could not be installed here. The cases below then fail for it, the table of the run tells why.
     session.run("crosscheck", "engines", "install", "--all", CONSTRAINTS, success_codes=[0, 3])
-    session.run("pytest", "-q", "tests/test_engines.py", env={"CROSSCHECK_TESTS_ENGINES": "all"})
+    session.run("pytest", "-q", "tests/engines/test_engines.py", env={"CROSSCHECK_TESTS_ENGINES": "all"})
     session.run("crosscheck", "run", "--all-engines", "--out", "reports", *session.posargs)
 
 

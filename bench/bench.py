@@ -19,22 +19,22 @@ import pinocchio as pin
 import pytorch_kinematics as pk
 import torch
 
-import harness.crosscheck
-from harness.analysis.interpolation import Axis, grid
-from harness.analysis.links import Link, certify_links, sample_links
-from harness.binding import bind
-from harness.certificates import certify_all
-from harness.crosscheck import crosscheck
+import harness.verdict.crosscheck
+from harness.certificate.interpolation import Axis, grid
+from harness.certificate.joint_axes import joint_axes
+from harness.certificate.links import Link, certify_links, sample_links
 from harness.description.dh import DHRow, DHTable
 from harness.description.locate import default_models_dir, find_model
 from harness.description.model import RobotModel, load_model
 from harness.engines.dh_numpy import DHNumpy
 from harness.engines.dh_pinocchio import DHPinocchio
 from harness.engines.registry import load_engine
-from harness.engines.workers import Workers
-from harness.joint_axes import joint_axes
-from harness.options import Options
-from harness.results import Certified, Results
+from harness.run.binding import bind
+from harness.run.certifying import certify_all
+from harness.run.options import Options
+from harness.run.results import Certified, Results
+from harness.verdict.crosscheck import crosscheck
+from harness.workers.pool import Workers
 
 N = 100_000
 ROUNDS = 5
@@ -123,10 +123,10 @@ def overhead_row(model: RobotModel) -> tuple[str, float, float, str]:
 _PEAK = """
 import re, sys
 from pathlib import Path
-from harness.crosscheck import crosscheck
+from harness.verdict.crosscheck import crosscheck
 from harness.description.locate import default_models_dir, find_model
 from harness.description.model import load_model
-from harness.options import Options
+from harness.run.options import Options
 model = load_model(find_model("ur5", default_models_dir()))
 crosscheck(model, Options(int(sys.argv[1]), 0, ("dh:pinocchio", "urdf:pinocchio")))
 # Not getrusage: across fork and exec it keeps the peak of the parent.
@@ -161,7 +161,7 @@ def certificate_rows() -> list[tuple[str, float, float, str]]:
             spent.append(time.perf_counter() - start)
             return certified
 
-        setattr(harness.crosscheck, "certify_all", timed)  # noqa: B010 - not exported there, on purpose
+        setattr(harness.verdict.crosscheck, "certify_all", timed)  # noqa: B010 - not exported there, on purpose
         ratios = []
         for _ in range(ROUNDS + 1):
             crosscheck(model, Options(0, 0, ("dh:pinocchio",)))
@@ -171,7 +171,7 @@ def certificate_rows() -> list[tuple[str, float, float, str]]:
         rows.append(
             (f"(certificate of {robot} - 50 ms) / {count} evaluations in both", statistics.median(ratios[1:]), 3.0, "at most")
         )
-    setattr(harness.crosscheck, "certify_all", certify_all)  # noqa: B010
+    setattr(harness.verdict.crosscheck, "certify_all", certify_all)  # noqa: B010
     return rows
 
 

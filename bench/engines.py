@@ -13,10 +13,10 @@ import resource
 import sys
 import time
 
-from harness.crosscheck import crosscheck
 from harness.description.locate import default_models_dir, find_model
 from harness.description.model import load_model
-from harness.options import Options
+from harness.run.options import Options
+from harness.verdict.crosscheck import crosscheck
 
 WALL = 1.2  # times what the cores allow
 TRANSFER = 0.10  # of the run

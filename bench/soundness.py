@@ -12,10 +12,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from harness.analysis.certify import certify, found_from, sample
-from harness.analysis.interpolation import weights
-from harness.analysis.links import certify_links, sample_links
-from tests.test_certify import axes_of, evaluate, links_of, perturbed, random_table
+from harness.certificate.certify import certify, found_from, sample
+from harness.certificate.interpolation import weights
+from harness.certificate.links import certify_links, sample_links
+from tests.certificate.test_certify import axes_of, evaluate, links_of, perturbed, random_table
 
 
 def main(count: int) -> int:

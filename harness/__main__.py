@@ -8,7 +8,7 @@ import sys
 def main() -> None:
     """Entry point."""
     try:
-        from harness.cli import main as command  # noqa: PLC0415
+        from harness.cli.main import main as command  # noqa: PLC0415
     except KeyboardInterrupt:
         sys.stderr.write("interrupted: reports written before are unchanged\n")
         sys.exit(130)

@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 from hypothesis import strategies as st
 
-from harness import crosscheck as module
 from harness import se3
 from harness.description.dh import DHRow, DHTable
 from harness.description.locate import default_models_dir
 from harness.description.model import RobotModel
-from harness.engines.workers import Workers
-from harness.options import Options
 from harness.report.document import Report
+from harness.run.options import Options
 from harness.se3 import Array
+from harness.verdict import crosscheck as module
+from harness.workers.pool import Workers
 
 Edit = tuple[str, str, str]
 
@@ -44,7 +44,7 @@ def shared_workers() -> Workers:
 
 
 def crosscheck(model: RobotModel, options: Options) -> Report:
-    """`harness.crosscheck.crosscheck` without starting every engine anew."""
+    """`harness.verdict.crosscheck.crosscheck` without starting every engine anew."""
     return module.crosscheck(model, options, None, shared_workers())
 
 

@@ -16,9 +16,11 @@ ROOT = Path(harness.__file__).parent
 BASE = {"harness", "harness.se3", "harness.errors"}
 ALLOWED = {
     "description": {"harness.description", *BASE},
-    "analysis": {"harness.analysis", "harness.description", *BASE},
-    "engines": {"harness.engines", "harness.description", *BASE},
     "report": {"harness.report", *BASE},
+    "comparison": {"harness.comparison", *BASE},
+    "certificate": {"harness.certificate", "harness.description", *BASE},
+    "cause": {"harness.cause", "harness.kinematics", "harness.description", *BASE},
+    "workers": {"harness.workers", "harness.engines", "harness.description", *BASE},
 }
 
 
@@ -92,7 +94,7 @@ def closure(start: Path) -> set[Path]:
 ADAPTERS = sorted(p for p in (ROOT / "engines").glob("*.py") if p.name.startswith(("dh_", "urdf_")))
 
 
-@pytest.mark.parametrize("path", [*ADAPTERS, ROOT / "engines" / "worker.py"], ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", [*ADAPTERS, ROOT / "workers" / "worker.py"], ids=lambda p: p.stem)
 def test_a_worker_needs_numpy_and_the_library_alone(path: Path) -> None:
     """Its environment may be the system's Python, or one that holds versions of its own of whatever the harness needs."""
     allowed = {*sys.stdlib_module_names, "numpy", "harness"}

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel
 
-from harness.cli import cli
+from harness.cli.main import cli
 from harness.description.configurations import ConfigurationsFile
 from harness.description.frames_file import FramesFile
 from harness.description.model import ModelFile

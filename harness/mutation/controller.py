@@ -14,9 +14,9 @@ from harness.engines import requirements
 from harness.engines.base import Engine
 from harness.engines.dh_numpy import DHNumpy
 from harness.engines.urdf_pinocchio import UrdfPinocchio
-from harness.engines.workers import Workers
 from harness.mutation.mutant import Fault
 from harness.se3 import Array
+from harness.workers.pool import Workers
 
 NAMES: dict[Fault, str] = {
     "degrees": "controller", "inverse": "controller", "reversed": "controller", "mimic ignored": "urdf:controller",

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.analysis import fit
-from harness.analysis.descriptions import X_AXIS, Z_AXIS, Reading
-from harness.analysis.recipes import TableRecipe, UrdfRecipe
+from harness.cause import fit
 from harness.description.model import RobotModel
 from harness.engines.registry import adapter_of, kind_of, registered
+from harness.kinematics.descriptions import X_AXIS, Z_AXIS, Reading
+from harness.kinematics.recipes import TableRecipe, UrdfRecipe
 from harness.mutation.controller import controller
 from harness.mutation.mutant import Mutant
 from harness.se3 import Array

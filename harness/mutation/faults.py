@@ -11,7 +11,7 @@ import numpy as np
 from lxml import etree
 
 from harness import se3
-from harness.analysis.catalogue import CUT
+from harness.cause.catalogue import CUT
 from harness.description.dh import DHRow
 from harness.description.model import RobotModel
 from harness.mutation.mutant import Cause, Fault, Mutant, with_frames, with_row, with_rows

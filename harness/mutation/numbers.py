@@ -7,11 +7,11 @@ from dataclasses import replace
 
 from lxml import etree
 
-from harness.analysis.mechanism import Parameter
 from harness.description.joints import mapped_chain
 from harness.description.model import RobotModel
 from harness.description.urdf_file import parse_urdf
 from harness.description.urdf_lint import check
+from harness.kinematics.mechanism import Parameter
 from harness.mutation.mutant import Cause, Mutant, with_row
 
 STEPS = (

@@ -10,17 +10,17 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import lru_cache
 from pathlib import Path
 
-from harness.crosscheck import crosscheck
 from harness.description.model import RobotModel, load_model
-from harness.engines.environments import where
 from harness.engines.registry import adapter_of
 from harness.errors import EngineUnavailable
 from harness.mutation.controller import FaultyWorkers
 from harness.mutation.mutant import Mutant
 from harness.mutation.score import MutationScore, Trial, score
 from harness.mutation.trial import SAMPLES, mutants_of, try_out
-from harness.options import Options
 from harness.report.explanation import Change
+from harness.run.options import Options
+from harness.verdict.crosscheck import crosscheck
+from harness.workers.environments import where
 
 SOURCES = ("urdf:pinocchio", "urdf:pytorch-kinematics")
 CHUNK = 12

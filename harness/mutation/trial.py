@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from harness.crosscheck import crosscheck
 from harness.description.model import RobotModel
 from harness.errors import CrosscheckError
-from harness.gate import FAILING
 from harness.mutation.controller import NAMES, FaultyWorkers
 from harness.mutation.effect import Effect, effect_of
 from harness.mutation.equivalent import equivalents, with_follower
@@ -17,10 +15,12 @@ from harness.mutation.mutant import Mutant
 from harness.mutation.numbers import of_table, of_urdf
 from harness.mutation.score import Trial
 from harness.mutation.structure import of_axes, of_frames
-from harness.options import Options
 from harness.report import document as doc
 from harness.report import explanation as reasons
-from harness.sources import deviation_on_file
+from harness.run.options import Options
+from harness.run.plan import deviation_on_file
+from harness.verdict.crosscheck import crosscheck
+from harness.verdict.gate import FAILING
 
 SAMPLES = 200
 NOTHING = 1e-13  # an effect below is none: rounding of the models

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.report.figures import in_one_place
+from harness.rendering.figures import in_one_place
 from harness.se3 import Array
 
 # Okabe and Ito: told apart by the colour-blind; each source has a thickness of its own as well.

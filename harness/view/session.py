@@ -10,17 +10,17 @@ from functools import cached_property
 
 import numpy as np
 
-from harness.analysis.singular import singular
-from harness.crosscheck import bind_all
 from harness.description.model import RobotModel
-from harness.engines.workers import Workers
 from harness.errors import EngineFailed
-from harness.options import Options
-from harness.poses import pose_all
-from harness.results import Results
+from harness.kinematics.singular import singular
+from harness.run.options import Options
+from harness.run.plan import Participant, pair_tolerance, plan
+from harness.run.results import Results
+from harness.run.streaming import compare
+from harness.run.worst import pose_all
 from harness.se3 import Array, position_error, rotation_error
-from harness.sources import Participant, pair_tolerance, plan
-from harness.streaming import compare
+from harness.verdict.crosscheck import bind_all
+from harness.workers.pool import Workers
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 from harness.description.model import load_model
-from harness.options import Options
-from harness.report.accepted import accepted_from, compared
+from harness.rendering.files import write_index, write_report
 from harness.report.document import Report
-from harness.report.files import write_index, write_report
+from harness.run.options import Options
+from harness.verdict.accepted import accepted_from, compared
 from tests.helpers import copied, crosscheck
 
 # The browser's path, said aloud by whoever runs these tests (nox -s browser).

@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from harness.report import figures
+from harness.rendering import figures
+from harness.rendering.files import write_report
 from harness.report.document import Report
-from harness.report.files import write_report
 from tests.browser.conftest import Open, until
-from tests.test_hostile import NAMES, rename
+from tests.rendering.test_hostile import NAMES, rename
 
 SECTIONS = ("verdict", "configurations", "who", "where", "why", "sure", "moved", "reproduce")
 PARTS = ("matrix", "pose", "mapping", "parameters", "absent", "skeleton", "distribution", "copy", "markdown")

@@ -1,0 +1,1 @@
+"""Which change makes both sides agree."""

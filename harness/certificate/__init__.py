@@ -1,0 +1,1 @@
+"""A bound that holds for every configuration."""

@@ -1,0 +1,122 @@
+"""`crosscheck frames` and `crosscheck engines`: what is there, before anything is compared."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+from rich.tree import Tree
+
+from harness.description.locate import find_model
+from harness.description.model import RobotModel, load_model
+from harness.description.urdf import Urdf, UrdfJoint
+from harness.description.urdf_file import read_urdf
+from harness.description.urdf_lint import lint
+from harness.engines.registry import registered
+from harness.errors import EngineUnavailable
+from harness.report.text import numbers, plain
+from harness.workers.environments import where
+
+
+def show_frames(robot: str, models: Path, console: Console) -> int:
+    """Print the frame tree of a robot model or a URDF file. Returns 2 if the URDF is not a tree, else 0."""
+    path = Path(robot)
+    if path.is_file() or path.suffix in (".urdf", ".xacro", ".xml"):
+        urdf = read_urdf(path)
+        findings = lint(urdf)
+        _show_tree(urdf, {}, console)
+    else:
+        model = load_model(find_model(robot, models))
+        findings = model.findings
+        _show_dh(model, console)
+        if model.urdf is not None:
+            _show_tree(model.urdf, _mapped(model), console)
+    for finding in findings:
+        style = {"error": "red", "warning": "yellow", "note": "dim"}[finding.level]
+        where = f"line {finding.line}: " if finding.line else ""
+        console.print(Text(f"{finding.level}: {where}{plain(finding.message)}", style=style), soft_wrap=True)
+    return 2 if any(f.level == "error" for f in findings) else 0
+
+
+def _show_dh(model: RobotModel, console: Console) -> None:
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
+    for column in ("DH frame", "row", "type", "a [m]", "alpha [rad]", "d [m]", "theta [rad]", "mapped to"):
+        table.add_column(column, overflow="fold")
+    for label in model.table.frames:
+        row = model.table.rows[int(label) - 1] if label.isdigit() and label != "0" else None
+        cells = (row.name, row.kind, *(f"{x:.9g}" for x in (row.a, row.alpha, row.d, row.theta))) if row else ("",) * 6
+        names = [f"{f.name} ({f.relation})" for f in model.frames.frames if f.dh == label]
+        table.add_row(*(Text(plain(c)) for c in (label, *cells, ", ".join(names))))
+    console.print(Text(f"{model.name}, {model.table.convention} DH"))
+    console.print(table)
+    console.print()
+
+
+def _show_tree(urdf: Urdf, mapped: dict[str, str], console: Console) -> None:
+    for root in urdf.roots:
+        tree = Tree(_link(root, mapped))
+        _grow(tree, urdf, root, mapped)
+        console.print(tree, soft_wrap=True)
+
+
+def _mapped(model: RobotModel) -> dict[str, str]:
+    texts = {}
+    for frame in model.frames.frames:
+        if frame.urdf is not None:
+            how = {"identical": "", "declared": ", declared offset", "rigid": ", rigid, offset measured"}[frame.relation]
+            via = f" via {frame.of}" if frame.of else ""
+            texts[frame.urdf] = f"{frame.name} = DH frame {frame.dh}{via}{how}"
+    return texts
+
+
+def _link(name: str, mapped: dict[str, str]) -> Text:
+    text = Text(plain(name), style="bold")
+    if name in mapped:
+        text.append(f"  [{plain(mapped[name])}]", style="not bold green")
+    return text
+
+
+def _grow(tree: Tree, urdf: Urdf, root: str, mapped: dict[str, str]) -> None:
+    """Add everything below `root`; a loop, because a chain may be deeper than Python recurses."""
+    stack, seen = [(tree, root)], {root}
+    while stack:
+        branch, link = stack.pop()
+        for joint in urdf.children(link):
+            text = _link(joint.child, mapped)
+            text.append(f"  {plain(_describe(joint))}", style="not bold dim")
+            if joint.child not in seen:  # two parents or a cycle: the lint says so, the tree shows it once
+                seen.add(joint.child)
+                stack.append((branch.add(text), joint.child))
+
+
+def _describe(joint: UrdfJoint) -> str:
+    parts = [f"{joint.name}: {joint.type}"]
+    if joint.type != "fixed":
+        parts.append(f"axis {numbers(joint.axis)}" if joint.axis else "no axis")
+    parts.append(f"xyz {numbers(joint.xyz)}")
+    if any(joint.rpy):
+        parts.append(f"rpy {numbers(joint.rpy)}")
+    if joint.mimic:
+        parts.append(f"mimics {joint.mimic.multiplier:g} * {joint.mimic.joint} + {joint.mimic.offset:g}")
+    return ", ".join(parts)
+
+
+def show_engines(console: Console) -> int:
+    """Print every registered engine: versions or the reason and the install line, then its traits."""
+    for name, entry in registered().items():
+        if entry.adapter is None:
+            console.print(Text(name, style="bold"), Text(f"broken: {plain(entry.problem)}", style="red"), soft_wrap=True)
+            continue
+        try:
+            found = ", ".join(f"{k} {v}" for k, v in where(entry.adapter).versions.items()) or "built in"
+            console.print(Text(name, style="bold"), Text(found, style="green"), soft_wrap=True)
+        except EngineUnavailable as error:
+            text = f"not installed: {error.reason}; {error.install}"
+            console.print(Text(name, style="bold"), Text(plain(text), style="yellow"), soft_wrap=True)
+        for trait in entry.adapter.traits:
+            when = f" [matters with: {trait.lint}]" if trait.lint else ""
+            console.print(Text(f"    {trait.text}{when}"), soft_wrap=True)
+            console.print(Text(f"        {trait.evidence}", style="dim"), soft_wrap=True)
+    return 0

@@ -1,0 +1,82 @@
+"""`crosscheck view`: a local page in which the sources of one robot can be moved and compared."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import io
+import logging
+import threading
+import webbrowser
+from pathlib import Path
+
+import click
+
+from harness.cli.console import console
+from harness.cli.run import complete_robots, complete_sources, models_option
+from harness.description.locate import default_models_dir, find_model
+from harness.description.model import load_model
+from harness.engines.registry import REFERENCE
+from harness.errors import EngineUnavailable
+from harness.report.text import plain
+from harness.run.options import Options
+from harness.view.page import Page
+from harness.view.session import Session
+
+LOOPBACK = "127.0.0.1"
+
+
+@click.command()
+@click.argument("robot", metavar="ROBOT", shell_complete=complete_robots)
+@models_option
+@click.option(
+    "--source", "sources", multiple=True, shell_complete=complete_sources, help="Show only this source; repeat for more."
+)
+@click.option(
+    "--reference", default=REFERENCE, show_default=True, shell_complete=complete_sources, help="Compare with this source."
+)
+@click.option("--samples", type=int, default=2000, show_default=True, help="Configurations among which the worst are looked for.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Their seed.")
+@click.option("--port", type=click.IntRange(1, 65535), default=8080, show_default=True, help="Port, or the next free one.")
+@click.option("--open", "open_page", is_flag=True, help="Open the page in the browser.")
+def view(
+    robot: str,
+    models: Path | None,
+    sources: tuple[str, ...],
+    reference: str,
+    samples: int,
+    seed: int,
+    port: int,
+    open_page: bool,
+) -> int:
+    """Show a robot's sources side by side in a local page, with a slider for each joint. Ctrl-C ends it.
+
+    The page is served to this machine alone. Needs viser: pip install 'fk-crosscheck[view]'.
+    """
+    try:
+        viser = importlib.import_module("viser")
+    except ImportError as error:
+        raise EngineUnavailable("view", f"import viser failed: {error}", "pip install 'fk-crosscheck[view]'") from None
+    model = load_model(find_model(robot, models or default_models_dir()))
+    options = Options(samples, seed, sources, reference, certify=False, explain=False)
+    logging.getLogger("websockets").setLevel(logging.ERROR)  # a browser that goes away is no error of ours
+    with options.workshop() as workshop:
+        session = Session(model, options, workshop)
+        with contextlib.redirect_stdout(io.StringIO()):  # its banner; the address is told below
+            server = viser.ViserServer(host=LOOPBACK, port=port, label=plain(model.name), verbose=False)
+        try:
+            Page(server, session)
+            url = f"http://{LOOPBACK}:{server.get_port()}"
+            for name, why in session.absent.items():
+                console().print(plain(f"{name} does not run: {why}"), markup=False, soft_wrap=True)
+            console().print(
+                plain(f"{model.name}, {len(session.sources)} sources: {url} (Ctrl-C ends it)"), markup=False, soft_wrap=True
+            )
+            if open_page:
+                webbrowser.open(url)
+            with contextlib.suppress(KeyboardInterrupt):
+                threading.Event().wait()
+        finally:
+            with contextlib.redirect_stdout(io.StringIO()):
+                server.stop()
+    return 0

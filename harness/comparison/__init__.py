@@ -1,0 +1,1 @@
+"""Two batches of placements in, discrepancies and statistics out."""

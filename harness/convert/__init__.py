@@ -1,0 +1,1 @@
+"""URDF to DH and back, with proof."""

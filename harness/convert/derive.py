@@ -1,0 +1,123 @@
+"""`crosscheck derive-dh`: the DH table of a serial chain in a URDF, found from its placements alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness import se3
+from harness.description.dh import Convention, DHRow, DHTable
+from harness.description.tidy import tidy_angle, tidy_length, tidy_transform
+from harness.description.urdf import MOVABLE, UNSUPPORTED, Urdf, UrdfJoint
+from harness.engines import requirements
+from harness.engines.dh_numpy import DHNumpy
+from harness.engines.registry import adapter_of
+from harness.errors import EngineFailed, InputError, UrdfError, nearest
+from harness.kinematics.canonical import canonical
+from harness.kinematics.screws import screws
+from harness.se3 import Array
+
+RESIDUAL = 1e-9
+
+
+@dataclass(frozen=True)
+class DerivedLink:
+    """A URDF link of the chain: the DH frame it rides on and its constant offset from it, T_dh_link (4, 4)."""
+
+    name: str
+    dh: str
+    offset: Array
+
+
+@dataclass(frozen=True)
+class Derived:
+    """A DH table, the links of the chain, the free directions fixed by choice, and how well the screws rebuild the chain."""
+
+    urdf: Urdf
+    table: DHTable
+    base: str
+    tip: str
+    links: tuple[DerivedLink, ...]
+    free: tuple[str, ...]
+    residual: float
+
+
+def derive(urdf: Urdf, base: str, tip: str, convention: Convention, source: str) -> Derived:
+    """DH table of the chain from link `base` to link `tip`, as the engine `source` places them.
+
+    Raises UrdfError where no DH table exists: a floating or planar joint, a mimic follower, a joint that is no unit screw.
+    """
+    if not source.startswith("urdf:"):
+        raise InputError(f"expected a source that reads a URDF, got {source!r}", key="--source")
+    for option, link in (("--base", base), ("--tip", tip)):
+        if link not in urdf.links:
+            raise InputError(f"no link {link!r} in {urdf.path.name}; {nearest(link, urdf.links)}", key=option)
+    path = urdf.between(base, tip)
+    joints = _chain_joints(urdf, path, base, tip)
+    place = _placer(urdf, [joint.name for joint in joints], base, source)
+    prismatic, names = [j.type == "prismatic" for j in joints], [j.name for j in joints]
+    found = screws(lambda q: place(q, [tip])[:, 0], prismatic, np.random.default_rng(0))
+    if not found.residual < RESIDUAL:
+        raise UrdfError(
+            f"{source} does not place it as a serial chain does: off by {found.residual:.2g} from its own screws", where=urdf.path
+        )
+    try:
+        form = canonical(found, prismatic, convention, names)
+    except ValueError as error:
+        raise UrdfError(f"no DH table: {error}", where=urdf.path) from None
+    rows = tuple(
+        DHRow(r.name, r.kind, tidy_length(r.a), tidy_angle(r.alpha), tidy_length(r.d), tidy_angle(r.theta)) for r in form.rows
+    )
+    table = DHTable(rows, convention, tidy_transform(form.base), tidy_transform(form.tool))
+    return Derived(urdf, table, base, tip, _links(path, base, table, place), form.free, found.residual)
+
+
+def _chain_joints(urdf: Urdf, path: tuple[UrdfJoint, ...], base: str, tip: str) -> list[UrdfJoint]:
+    for joint in path:
+        if joint.type in UNSUPPORTED:
+            raise UrdfError(f"no DH table: joint {joint.name!r} is {joint.type}", where=urdf.path, line=joint.line)
+        if joint.type in MOVABLE and joint.mimic is not None:
+            raise UrdfError(
+                f"no DH table: joint {joint.name!r} mimics {joint.mimic.joint!r}, and a row has a joint of its own",
+                where=urdf.path, line=joint.line,
+            )  # fmt: skip
+    joints = [joint for joint in path if joint.type in MOVABLE]
+    if not joints:
+        raise UrdfError(f"no DH table: nothing moves between {base!r} and {tip!r}", where=urdf.path)
+    return joints
+
+
+def _placer(urdf: Urdf, joints: list[str], base: str, source: str) -> Callable[[Array, list[str]], Array]:
+    """q (N, n) and link names to placements in the base link, (N, links, 4, 4); all other joints at zero."""
+    engine = requirements.build(adapter_of(source), urdf)
+    if missing := [name for name in joints if name not in engine.joints]:
+        raise EngineFailed(source, f"does not have joint {missing[0]!r}")
+
+    def place(q: Array, links: list[str]) -> Array:
+        values = np.zeros((len(q), len(engine.joints)))
+        values[:, [engine.joints.index(name) for name in joints]] = q
+        T = engine.placements(values, [base, *links])
+        return np.asarray(se3.inverse(T[:, :1]) @ T[:, 1:])
+
+    return place
+
+
+def _links(
+    path: tuple[UrdfJoint, ...], base: str, table: DHTable, place: Callable[[Array, list[str]], Array]
+) -> tuple[DerivedLink, ...]:
+    """Every link on the way from base to tip with the DH frame that moves with it."""
+    at, moved, order = base, 0, []
+    for joint in path:
+        at = joint.child if joint.parent == at else joint.parent
+        moved += joint.type in MOVABLE
+        order.append((at, moved))
+    zero = np.zeros((1, len(table.joints)))
+    T_base_dh = dict(zip(table.frames, DHNumpy(table).placements(zero, table.frames)[0], strict=True))
+    T_base_link = place(zero, [name for name, _ in order])[0]
+    links = []
+    for (name, moved), T in zip(order, T_base_link, strict=True):
+        label = "base" if moved == 0 else "tool" if name == order[-1][0] else str(moved)
+        links.append(DerivedLink(name, label, se3.inverse(T_base_dh[label]) @ T))
+    return tuple(links)

@@ -1,0 +1,1 @@
+"""Any two descriptions compared, and which known one a mechanism is."""

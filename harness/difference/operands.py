@@ -1,0 +1,120 @@
+"""What `crosscheck diff` and `identify` are given: a robot model, a DH CSV, a URDF file, or one in an installed package."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from harness.description.dh import Convention, DHTable
+from harness.description.dh_csv import read_dh_csv
+from harness.description.joints import complete, leader_of
+from harness.description.locate import find_model, packaged_file
+from harness.description.model import load_model
+from harness.description.urdf import MOVABLE, UNSUPPORTED, Urdf
+from harness.description.urdf_file import read_urdf
+from harness.description.urdf_lint import check
+from harness.errors import InputError, UrdfError, nearest
+from harness.kinematics.recipes import Recipe, TableRecipe, UrdfRecipe
+from harness.workers.packaged_tables import packaged_table
+
+TIP = "tip"
+TOOLBOX = "roboticstoolbox:"
+
+
+@dataclass(frozen=True)
+class Operand:
+    """One mechanism from a base to a tip: a DH table, or a chain of a URDF."""
+
+    name: str
+    joints: tuple[str, ...]
+    prismatic: tuple[bool, ...]
+    table: DHTable | None = None
+    urdf: Urdf | None = None
+    base: str = ""
+    tip: str = ""
+
+    @property
+    def label(self) -> str:
+        """What it is called in sentences."""
+        return self.name if self.urdf is None else f"{self.name} ({self.base} to {self.tip})"
+
+    def recipe(self, order: Sequence[str], names: Mapping[str, str], gauge: bool) -> Recipe:
+        """Its mechanism in the joints `order`; names: its own joint for each of them. gauge: with base and tool parameters."""
+        if self.table is not None:
+            return TableRecipe(self.table, {TIP: ("tool", np.eye(4))})
+        if self.urdf is None:
+            raise ValueError("neither a table nor a URDF")
+        rows = {names[joint]: (np.eye(len(order))[i], 0.0) for i, joint in enumerate(order)}
+        kinds = dict(zip(self.joints, self.prismatic, strict=True))
+        slides = tuple(kinds[names[joint]] for joint in order)
+        joints = complete(rows, self.urdf, len(order))
+        return UrdfRecipe(self.urdf, self.base, {TIP: self.tip}, joints, tuple(order), slides, gauge=gauge)
+
+
+def read_operand(text: str, models: Path, base: str | None, tip: str | None, convention: Convention) -> Operand:
+    """A robot model's name or folder, `roboticstoolbox:NAME`, FILE.csv, FILE.urdf, or PACKAGE:FILE.urdf.
+
+    Raises InputError and its kind for what cannot be read.
+    """
+    if text.startswith(TOOLBOX):
+        return _of_table(packaged_table(text.removeprefix(TOOLBOX)), text)
+    package, colon, file = text.partition(":")
+    if colon and not Path(text).exists():
+        return _of_urdf(packaged_file(package, file), base, tip)
+    path = Path(text)
+    if path.suffix.lower() == ".csv":
+        rows, _ = read_dh_csv(path)
+        return _of_table(DHTable(rows, convention), path.stem)
+    if path.is_file() or path.suffix.lower() in (".urdf", ".xml", ".xacro"):
+        return _of_urdf(path, base, tip)
+    model = load_model(find_model(text, models))
+    return _of_table(model.table, model.name)
+
+
+def _of_table(table: DHTable, name: str) -> Operand:
+    if not table.joints:
+        raise InputError("expected at least one joint that moves, every row is fixed", where=name)
+    return Operand(name, table.joints, tuple(table.kind(j) == "prismatic" for j in table.joints), table=table)
+
+
+def _of_urdf(path: Path, base: str | None, tip: str | None) -> Operand:
+    urdf = read_urdf(path)
+    check(urdf)
+    base, tip = base or urdf.roots[0], tip or only_leaf(urdf)
+    for option, link in (("--base", base), ("--tip", tip)):
+        if link not in urdf.links:
+            raise InputError(f"no link {link!r} in {urdf.path.name}; {nearest(link, urdf.links)}", key=option)
+    chain = urdf.between(base, tip)
+    for joint in chain:
+        if joint.type in UNSUPPORTED:
+            raise UrdfError(f"joint {joint.name!r} on the chain is {joint.type}", where=path, line=joint.line)
+    leaders = {leader_of(urdf, joint).name: leader_of(urdf, joint) for joint in chain if joint.type in MOVABLE}
+    if not leaders:
+        raise InputError(f"nothing moves between {base!r} and {tip!r}", where=path, hint="choose --base and --tip")
+    kinds = tuple(joint.type == "prismatic" for joint in leaders.values())
+    return Operand(path.name, tuple(leaders), kinds, urdf=urdf, base=base, tip=tip)
+
+
+def only_leaf(urdf: Urdf) -> str:
+    """The link at the end, if there is one only. Raises InputError."""
+    leaves = [link for link in urdf.links if not urdf.children(link)]
+    if len(leaves) != 1:
+        raise InputError(f"expected --tip: the file has {len(leaves)} leaves", where=urdf.path, hint=", ".join(leaves[:12]))
+    return leaves[0]
+
+
+def matched(a: Operand, b: Operand) -> dict[str, str]:
+    """b's joint for each of a's: by name if the names are the same, else in order from the base. Raises InputError."""
+    if len(a.joints) != len(b.joints):
+        counts = f"{a.label} has {len(a.joints)} joints ({', '.join(a.joints)}), {b.label} has {len(b.joints)}"
+        raise InputError(f"no two of one kind: {counts} ({', '.join(b.joints)})", hint="choose --base and --tip")
+    names = dict(zip(a.joints, a.joints if set(a.joints) == set(b.joints) else b.joints, strict=True))
+    kinds = [dict(zip(o.joints, o.prismatic, strict=True)) for o in (a, b)]
+    for joint, other in names.items():
+        if kinds[0][joint] != kinds[1][other]:
+            slides, turns = (a.label, b.label) if kinds[0][joint] else (b.label, a.label)
+            raise InputError(f"joint {joint!r} slides in {slides}, and turns in {turns}")
+    return names

@@ -1,0 +1,76 @@
+"""How a description becomes a mechanism, as data: what a structural repair changes before the mechanism is built again.
+
+A recipe is a DH table or a URDF, where each compared frame is in it, and how the implementation mixes its joint values. Edits of
+one recipe compose, whatever their order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TypeAlias
+
+from harness.description.dh import DHTable
+from harness.description.joints import JointMap
+from harness.description.urdf import Urdf
+from harness.kinematics.descriptions import SPECIFIED, Reading, of_table, of_urdf
+from harness.kinematics.mechanism import Mechanism
+from harness.se3 import Array
+
+
+def asked(mechanism: Mechanism, P: Array | None) -> Mechanism:
+    """The mechanism of an implementation that takes P q for q; P (n, n), None for q itself."""
+    return mechanism if P is None else mechanism.driven(P)
+
+
+@dataclass(frozen=True)
+class TableRecipe:
+    """A DH table; frames: for each compared frame its DH label and the constant transform behind it, (4, 4)."""
+
+    table: DHTable
+    frames: Mapping[str, tuple[str, Array]]
+    backwards: bool = False
+    P: Array | None = None
+
+    @cached_property
+    def mechanism(self) -> Mechanism:
+        """The mechanism that comes of it."""
+        return asked(of_table(self.table, self.frames, self.backwards), self.P)
+
+
+@dataclass(frozen=True)
+class UrdfRecipe:
+    """A URDF seen from link `base`; frames: for each compared frame its link; joints: the map from the model's joints."""
+
+    urdf: Urdf
+    base: str
+    frames: Mapping[str, str]
+    joints: JointMap
+    model_joints: tuple[str, ...]
+    prismatic: tuple[bool, ...]
+    reading: Reading = SPECIFIED
+    P: Array | None = None
+    gauge: bool = False
+
+    @cached_property
+    def mechanism(self) -> Mechanism:
+        """The mechanism that comes of it."""
+        return asked(self.bare(self.base, self.frames), self.P)
+
+    def bare(self, base: str, frames: Mapping[str, str]) -> Mechanism:
+        """The mechanism asked at q itself, for other links."""
+        return of_urdf(self.urdf, base, frames, self.joints, self.model_joints, self.prismatic, self.reading, self.gauge)
+
+    def with_joint(self, name: str, **changes: object) -> UrdfRecipe:
+        """With one joint of the URDF changed."""
+        joints = tuple(replace(j, **changes) if j.name == name else j for j in self.urdf.joint_list)  # type: ignore[arg-type]
+        return replace(self, urdf=replace(self.urdf, joint_list=joints))
+
+
+Recipe: TypeAlias = TableRecipe | UrdfRecipe
+
+
+def mixed(recipe: Recipe, P: Array) -> Recipe:
+    """The recipe, taking P q for q first."""
+    return replace(recipe, P=P if recipe.P is None else recipe.P @ P)

@@ -1,0 +1,1 @@
+"""The report document as HTML, Markdown, JUnit and terminal text."""

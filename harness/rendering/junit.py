@@ -1,0 +1,89 @@
+"""JUnit XML: one case per source and frame, one per published placement, so that a CI server lists what failed."""
+
+from __future__ import annotations
+
+from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
+
+from harness.report.document import PublishedResult, Report, Source
+from harness.report.regression import Regression
+from harness.report.source_parts import FrameResult
+from harness.report.text import metres, numbers, plain, radians, why
+from harness.verdict.accepted import worsened
+
+
+def render_junit(report: Report) -> str:
+    """The report as JUnit XML text."""
+    suite = TestSuite(plain(report.robot.name))
+    for source in report.sources:
+        if source.reference:
+            continue
+        if source.status != "ran":
+            suite.add_testcase(_not_run(report, source))
+        for frame in source.frames:
+            suite.add_testcase(_frame(report, source, frame))
+        if source.verdict in ("invalid placements", "keeps state"):
+            suite.add_testcase(_invalid(report, source))
+    for claim in report.published:
+        suite.add_testcase(_published(report, claim))
+    if report.regression is not None and report.regression.strict:
+        suite.add_testcase(_regression(report, report.regression))
+    xml = JUnitXml()
+    xml.add_testsuite(suite)
+    xml.update_statistics()  # type: ignore[no-untyped-call]
+    return bytes(xml.tostring()).decode()  # type: ignore[no-untyped-call]
+
+
+def _case(report: Report, name: str, group: str) -> TestCase:
+    return TestCase(plain(name), classname=plain(f"{report.robot.name}.{group}"))
+
+
+def _not_run(report: Report, source: Source) -> TestCase:
+    case = _case(report, source.status, source.name)
+    message = plain(f"{source.status}: {source.reason} {source.install}".strip())
+    case.result = [Error(message) if source.required else Skipped(message)]
+    return case
+
+
+def _frame(report: Report, source: Source, frame: FrameResult) -> TestCase:
+    case = _case(report, frame.frame, source.name)
+    if frame.passes:
+        return case
+    failure = Failure(
+        plain(f"{frame.verdict}: {metres(frame.position.max)}, {radians(frame.rotation.max)} from {report.settings.reference}")
+    )
+    lines = [f"tolerance {metres(source.tolerance.position)}, {radians(source.tolerance.rotation)}"]
+    if frame.position.worst:
+        lines.append(f"worst position at {frame.position.worst.label}: q = {numbers(frame.position.worst.q, 17)}")
+    if source.reproducer:
+        r = source.reproducer
+        lines.append(f"smallest reproducer, frame {r.frame}: q = {numbers(r.q, 17)}, {metres(r.position)}, {radians(r.rotation)}")
+    lines += [f"why: {text.strip()}" for text in why(source)]
+    failure.text = "\n".join(plain(line) for line in [*lines, report.settings.command])
+    case.result = [failure]
+    return case
+
+
+def _invalid(report: Report, source: Source) -> TestCase:
+    case = _case(report, "placements are rigid transforms that depend on q alone", source.name)
+    if source.validity:
+        v = source.validity
+        again = f"; asked again, one changed by {v.again:.2g}"
+        case.result = [Failure(f"{v.invalid} of {v.checked} are no rigid transforms{again}")]
+    return case
+
+
+def _regression(report: Report, found: Regression) -> TestCase:
+    """A strict run's own case: nothing grew since it was accepted."""
+    case = _case(report, f"nothing grew since {found.accepted}", "regression")
+    if lines := worsened(found):
+        failure = Failure(plain(lines[0]))
+        failure.text = "\n".join(plain(line) for line in [*lines, report.settings.command])
+        case.result = [failure]
+    return case
+
+
+def _published(report: Report, claim: PublishedResult) -> TestCase:
+    case = _case(report, f"{claim.configuration}: DH frame {claim.frame} in {claim.relative_to}", "published")
+    if claim.found != claim.status:
+        case.result = [Failure(plain(f"filed as {claim.status}, found {claim.found}: off by {claim.position_error:.3g} m"))]
+    return case

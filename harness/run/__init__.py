@@ -1,0 +1,1 @@
+"""One cross-check: plan, load, bind, stream, certify, explain."""

@@ -1,0 +1,159 @@
+"""Explains a disagreement of a run: what both sources showed, and their descriptions, handed to the search for a repair."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from harness.cause import fit
+from harness.cause.changes import Change
+from harness.cause.explain import explain, shown
+from harness.cause.first_difference import first_difference
+from harness.cause.problem import FAITHFUL, Problem, Seen, State
+from harness.description.model import RobotModel
+from harness.engines.registry import kind_of
+from harness.kinematics.descriptions import X_AXIS, Z_AXIS, Reading
+from harness.kinematics.recipes import Recipe, TableRecipe, UrdfRecipe
+from harness.kinematics.screws import finite_steps
+from harness.run.binding import Bound
+from harness.run.plan import pair_tolerance
+from harness.run.results import Explained, Results
+from harness.se3 import Array
+
+FITTED, CHECKED = 16, 48
+ROUNDING = 2.0**-46  # of a length: 64 units in the last place, for a product of a dozen transforms
+SHARED = 0.5  # of the tolerance: what another source's repair may leave of this one
+
+
+def problem_of(
+    model: RobotModel, offsets: Mapping[str, Array], reference: Bound, source: Bound, tolerance: tuple[float, float]
+) -> Problem:
+    """What a search needs to know about a source that disagrees with its reference."""
+    known = [i for i in reference.view.available if i in source.view.available]
+    q = configurations(model)
+    both = [bound.mapped(q) for bound in (reference, source)]
+    T_a, T_b = (np.stack([T[i] for i in known], axis=1) for T in both)
+    frames = [model.frames.frames[i] for i in known]
+    names = tuple(f.name for f in frames)
+    parts = (Seen(q[:FITTED], T_a[:FITTED], T_b[:FITTED]), Seen(q[FITTED:], T_a[FITTED:], T_b[FITTED:]))
+    kinds = [kind_of(bound.engine.source) for bound in (reference, source)]
+    # Lengths in millimetres taken for metres come with a thousand times the rounding: a right repair leaves that.
+    largest = max(float(np.nan_to_num(np.abs(T[..., :3, 3])).max(initial=0.0)) for T in (T_a, T_b))
+    tolerance = (max(tolerance[0], ROUNDING * largest), tolerance[1])
+    recipes = []
+    for bound, kind, T in zip((reference, source), kinds, (T_a, T_b), strict=True):
+        packaged = bound.engine.takes == "packaged"
+        candidates = [] if packaged else list(recipes_of(model, kind, names, offsets))
+        recipes.append(_faithful(candidates, q, names, T, tolerance))
+    rigid = frozenset(f.name for f in frames if f.relation == "rigid") if kinds[0] != kinds[1] else frozenset()
+    if kinds == ["dh", "dh"]:
+        recipes[1] = None  # one table: what differs is what is done with it
+    behind = {names[i]: source.view.offsets[k] for i, k in enumerate(known)}
+    labels = ["dh.csv" if kind == "dh" else "the URDF" for kind in kinds]
+    engines = (reference.engine.source, source.engine.source)
+    # Two descriptions that are read as they should be differ themselves; else it is the engine that does.
+    sources = [label if recipe else name for label, recipe, name in zip(labels, recipes, engines, strict=True)]
+    return Problem(
+        recipes[0], recipes[1], names, rigid, *parts, tolerance, behind, (labels[0], labels[1]), (sources[0], sources[1]), engines
+    )
+
+
+def configurations(model: RobotModel) -> Array:
+    """Where both sources are asked, (N, n): random within limits, then zero and one finite step of each joint."""
+    rng = np.random.default_rng(0)
+    law = model.configurations
+    q = rng.uniform(law.lower, law.upper, (FITTED + CHECKED, len(law.lower)))
+    steps = np.diag(finite_steps([not turns for turns in law.revolute]))
+    return np.concatenate([q, np.zeros((1, len(law.lower))), steps])
+
+
+def recipes_of(model: RobotModel, kind: str, names: tuple[str, ...], offsets: Mapping[str, Array]) -> Iterator[Recipe]:
+    """The description, in every way in which a source of this kind may read it."""
+    frames = {f.name: f for f in model.frames.frames if f.name in names}
+    if kind == "dh" or model.urdf is None or model.urdf_joints is None:
+        known = {n: offsets.get(n, np.eye(4)) if f.offset is None else f.offset for n, f in frames.items()}
+        yield TableRecipe(model.table, {n: (f.dh, known[n]) for n, f in frames.items()})
+        return
+    prismatic = tuple(model.table.kind(j) == "prismatic" for j in model.table.joints)
+    links = {n: f.urdf or "" for n, f in frames.items()}
+    plain = UrdfRecipe(model.urdf, model.frames.base.urdf or "", links, model.urdf_joints, model.table.joints, prismatic)
+    codes = {finding.code for finding in model.findings}
+    for axis in (X_AXIS, Z_AXIS) if "missing-axis" in codes else (X_AXIS,):
+        for stretched in (False, True) if "unnormalised-axis" in codes else (False,):
+            for mimic in (True, False) if model.urdf_joints.followers else (True,):
+                for float32 in (False, True):
+                    yield replace(plain, reading=Reading(axis, stretched, mimic, float32))
+
+
+def _faithful(
+    candidates: list[Recipe], q: Array, names: tuple[str, ...], T: Array, tolerance: tuple[float, float]
+) -> Recipe | None:
+    """The first recipe that gives what the source gave, to a part of the tolerance; None if none does."""
+    for recipe in candidates:
+        errors = fit.errors(recipe.mechanism.placements(q, names), T)
+        if all(error <= FAITHFUL * limit for error, limit in zip(errors, tolerance, strict=True)):
+            return recipe
+    return None
+
+
+def explain_all(results: Results) -> dict[str, Explained]:
+    """Why each source that is outside tolerance is; those that show the same as one before share its explanation."""
+    reference, comparison = results.participants[0], results.comparison
+    if reference.bound is None or comparison is None:
+        return {}
+    found: dict[str, Explained] = {}
+    solved: list[tuple[Problem, Explained]] = []
+    every = range(len(results.model.frames.frames))
+    for participant in results.participants[1:]:
+        tolerance = pair_tolerance(participant.planned, reference.planned)
+        if participant.bound is None or comparison.worst(participant.name, tolerance, every) is None:
+            continue
+        try:
+            problem = problem_of(results.model, results.offsets, reference.bound, participant.bound, tolerance)
+        except Exception as error:  # an engine's failure is its result; the comparison stands without its cause
+            found[participant.name] = Explained(unexplained=f"{participant.name} failed: {type(error).__name__}: {error}")
+            continue
+        shared = (_of_another(known, one, problem) for one, known in solved)
+        mine = next((known for known in shared if known is not None), None)
+        if mine is None:
+            mine = told(problem, results.model)
+            solved.append((problem, mine))
+        found[participant.name] = mine
+    return found
+
+
+def told(problem: Problem, model: RobotModel) -> Explained:
+    """The repair that explains the difference, or where the two part."""
+    explanation = explain(problem)
+    if explanation is not None:
+        return Explained(explanation)
+    prismatic = tuple(model.table.kind(j) == "prismatic" for j in model.table.joints)
+    return Explained(unexplained=first_difference(problem, model.table.joints, prismatic))
+
+
+def _of_another(known: Explained, one: Problem, other: Problem) -> Explained | None:
+    """The explanation of one source as that of another that showed the same; None if that does not follow.
+
+    What the repair leaves of one, and what the other is off that one, bound what it leaves of the other.
+    """
+    kinds = [problem.engines[1].split(":")[0] for problem in (one, other)]
+    e = known.explanation
+    if e is None or one.names != other.names or kinds[0] != kinds[1] or one.sources != other.sources:
+        return None
+    apart = [
+        max(pair)
+        for pair in zip(*(fit.errors(x.b, y.b) for x, y in ((one.seen, other.seen), (one.check, other.check))), strict=True)
+    ]
+    left = (e.after[0] + apart[0], e.after[1] + apart[1])
+    if not all(x <= SHARED * limit for x, limit in zip(left, other.tolerance, strict=True)):
+        return None
+    old, new = one.engines[1], other.engines[1]
+
+    def named(change: Change) -> Change:
+        return replace(change, text=change.text.replace(old, new))
+
+    changes, others = tuple(map(named, e.changes)), tuple(tuple(map(named, slot)) for slot in e.equivalents)
+    before = shown(State.start(other))
+    return Explained(replace(e, changes=changes, equivalents=others, before=before, after=left))

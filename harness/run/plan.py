@@ -1,0 +1,170 @@
+"""Which sources take part in a run, how far each may be off, and what became of it."""
+
+from __future__ import annotations
+
+import contextlib
+import fnmatch
+from collections.abc import Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+from harness.description.model import RobotModel, Tolerance
+from harness.engines.registry import REFERENCE, adapter_of, kind_of, registered
+from harness.errors import EngineFailed, EngineUnavailable, InputError, MappingError, nearest
+from harness.run.binding import Bound
+from harness.run.options import Options
+from harness.verdict.judge import Deviation
+
+Status: TypeAlias = Literal["ran", "not run", "failed"]
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A source that is to run: an engine, or a command of the user's that speaks the worker protocol, run in `folder`."""
+
+    name: str
+    required: bool
+    tolerance: Tolerance
+    command: tuple[str, ...] = ()
+    folder: Path | None = None
+
+
+@dataclass
+class Participant:
+    """A planned source and what became of it. `bound` is None unless it runs."""
+
+    planned: Planned
+    bound: Bound | None = None
+    status: Status = "ran"
+    reason: str = ""
+    install: str = ""
+
+    @property
+    def name(self) -> str:
+        """Source name."""
+        return self.planned.name
+
+    def running(self) -> Bound:
+        """Its engine. Raises RuntimeError if it does not run."""
+        if self.bound is None:
+            raise RuntimeError(f"{self.name} is not bound")
+        return self.bound
+
+    def fail(self, error: Exception) -> None:
+        """Take the source out and keep why. What third-party code raises is its result, not the end of the run."""
+        self.bound = None
+        self.status = "not run" if isinstance(error, EngineUnavailable) else "failed"
+        self.reason = error.reason if isinstance(error, EngineUnavailable | EngineFailed) else f"{type(error).__name__}: {error}"
+        self.install = (error.install or "") if isinstance(error, EngineUnavailable) else ""
+
+
+def plan(model: RobotModel, options: Options) -> list[Planned]:
+    """The reference first, then the sources of model.toml or those chosen, the commands given, and all engines if asked.
+
+    Chosen ones and commands are required; an engine that model.toml does not list is not. Raises InputError for an unknown
+    source, or if nothing is left to compare.
+    """
+    entries = {entry.name: entry for entry in model.file.source}
+    commands = {**{e.name: tuple(e.command) for e in entries.values() if e.command}, **dict(options.workers)}
+    asked = [options.reference, *options.sources, *dict(options.workers)]
+    listed = [] if options.sources else [REFERENCE, *entries]
+    more = [name for name in registered() if model.urdf or kind_of(name) != "urdf"] if options.all_engines else []
+    planned = []
+    for name in dict.fromkeys([options.reference, *listed, *asked, *more]):
+        entry = entries.get(name)
+        _check_known(name, commands)
+        if kind_of(name) == "urdf" and model.urdf is None:
+            raise InputError(f"{model.name} has no [urdf] table for it", key=name)
+        required = name in (*asked, REFERENCE) or (entry is not None and entry.required)
+        tolerance = (entry and entry.tolerance) or model.file.tolerance
+        if entry is None and name not in commands:
+            tolerance = _no_finer_than(tolerance, name)
+        folder = None if name in dict(options.workers) else model.folder
+        planned.append(Planned(name, required, tolerance, commands.get(name, ()), folder))
+    if len(planned) < 2:
+        raise InputError(
+            f"{model.name}: nothing to compare with the reference {options.reference}",
+            hint=f"choose among: {', '.join(entries)}",
+        )
+    known = {*entries, *commands, *registered()}
+    _check_accepted(model, known)
+    _check_engine_names(model, known)
+    return planned
+
+
+def _no_finer_than(tolerance: Tolerance, name: str) -> Tolerance:
+    """The tolerance of an engine that model.toml does not list: its own resolution counts, if it is coarser."""
+    try:
+        finest = adapter_of(name).resolution
+    except EngineUnavailable:  # broken, and will say so itself
+        return tolerance
+    return Tolerance(position=max(tolerance.position, finest), rotation=max(tolerance.rotation, finest))
+
+
+def _check_known(name: str, commands: Mapping[str, tuple[str, ...]]) -> None:
+    """Raise InputError unless `name` is a registered source or a command, and not both.
+
+    A broken adapter is known, and will say so itself.
+    """
+    if name not in commands:
+        with contextlib.suppress(EngineUnavailable):
+            adapter_of(name)
+    elif name in registered():
+        raise InputError("this is the name of an engine; give the command another", key=name)
+
+
+def _check_engine_names(model: RobotModel, known: set[str]) -> None:
+    """Refuse what looks like a misspelt engine. A name that nothing is like may be that of a program given with --worker."""
+    for name in model.engine_names:
+        if name not in known and (set(name) & set("*?[") or not name.strip() or get_close_matches(name, known, 1, 0.75)):
+            raise MappingError(
+                f"no source {name!r}; {nearest(name, known)}", where=model.folder / "frames.toml", key=f'engine."{name}"'
+            )
+
+
+def _check_accepted(model: RobotModel, known: set[str]) -> None:
+    for i, accepted in enumerate(model.file.accepted):
+        for source in accepted.sources:
+            if not fnmatch.filter(known, source):
+                raise MappingError(
+                    f"no source {source!r}; {nearest(source, known)}",
+                    where=model.folder / "model.toml",
+                    key=f"accepted[{i}].source",
+                )
+
+
+def pair_tolerance(a: Planned, reference: Planned) -> tuple[float, float]:
+    """Tolerance (m, rad) of a source against the reference.
+
+    Tolerances on file are against the in-house FK; against another reference they add up (triangle inequality).
+    """
+    if reference.name == REFERENCE:
+        return a.tolerance.position, a.tolerance.rotation
+    own = [p.tolerance for p in (a, reference) if p.name != REFERENCE]
+    return sum(t.position for t in own), sum(t.rotation for t in own)
+
+
+def deviation_on_file(model: RobotModel, source: str, reference: str, frame: str) -> tuple[Deviation, str] | None:
+    """The accepted deviation of `source` from `reference` at `frame`, and its reason.
+
+    On file it is against the in-house FK. Another reference brings its own: two sources with the same one agree.
+    """
+
+    def on_file(name: str) -> tuple[Deviation, str] | None:
+        for entry in model.file.accepted:
+            if entry.covers(name) and frame in entry.frames:
+                return Deviation(entry.position, entry.rotation, entry.within), entry.reason
+        return None
+
+    own, theirs = on_file(source), on_file(reference)
+    if theirs is None or own is None:
+        return own or theirs
+    return None
+
+
+def cause_on_file(model: RobotModel, source: str, reference: str) -> dict[tuple[str, str], float]:
+    """Which numbers explain the accepted deviations of a source, {(joint, parameter): change [m or rad]}; empty if none do."""
+    entries = [e for e in model.file.accepted if e.covers(source) != e.covers(reference)]
+    return {(joint, name): size for e in entries for joint, part in e.cause.items() for name, size in part.items()}

@@ -1,0 +1,1 @@
+"""From what was found to pass or fail: the only place that decides."""
