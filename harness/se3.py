@@ -94,3 +94,11 @@ def rotation_error(T_a: Array, T_b: Array) -> Array:
 def chord_angle(chord: Array) -> Array:
     """Angle [rad] of two rotations that are a Frobenius distance `chord` apart; see `rotation_error`."""
     return np.asarray(2.0 * np.arcsin(np.minimum(1.0, chord / _CHORD)))
+
+
+def mean_transform(T: Array) -> Array:
+    """Mean of transforms (..., 4, 4), the rotation in the chordal sense (Moakher 2002, doi:10.1137/S0895479801383877)."""
+    mean = T.reshape(-1, 4, 4).mean(axis=0)
+    U, _, Vt = np.linalg.svd(mean[:3, :3])
+    mean[:3, :3] = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+    return np.asarray(mean)

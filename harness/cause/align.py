@@ -12,7 +12,7 @@ from harness.kinematics.canonical import Canonical, canonical
 from harness.kinematics.invariants import match, zero_offsets
 from harness.kinematics.mechanism import Parameter
 from harness.kinematics.recipes import TableRecipe, mixed
-from harness.kinematics.screws import Screws, finite_steps, fit_gauge, log
+from harness.kinematics.screws import chain_screws, fit_gauge
 from harness.se3 import Array
 
 PARALLEL = 1e-3
@@ -42,13 +42,6 @@ def aligned(state: State) -> State | None:
         if abs(offset) > NOTHING:
             zeros[Knob("a", Parameter(name, number, "m" if slides else "rad"))] = offset
     return _based(state.shifted(zeros), prismatic)
-
-
-def chain_screws(T: Array, prismatic: list[bool]) -> Screws:
-    """Screws from the placements (n + 1, 4, 4) at zero and after one step of each joint."""
-    steps = finite_steps(prismatic)
-    S = np.array([log(T[i + 1] @ se3.inverse(T[0])) / steps[i] for i in range(len(prismatic))]).reshape(-1, 6)
-    return Screws(T[0], S, 0.0)
 
 
 def _steps(T: Array, count: int, state: State) -> Array:

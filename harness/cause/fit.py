@@ -126,12 +126,4 @@ def _harmonics(T: Array, xi: Array, moves: Mask) -> tuple[Array, Array, Array]:
 def behind(T: Array, wanted: Array) -> Array:
     """The constant Y (4, 4) of each frame for which T Y comes nearest to `wanted`, (F, 4, 4)."""
     gap = se3.inverse(T) @ wanted
-    return np.array([mean_transform(gap[:, f]) for f in range(gap.shape[1])])
-
-
-def mean_transform(T: Array) -> Array:
-    """Mean of transforms (..., 4, 4), the rotation in the chordal sense (Moakher 2002, doi:10.1137/S0895479801383877)."""
-    mean = T.reshape(-1, 4, 4).mean(axis=0)
-    U, _, Vt = np.linalg.svd(mean[:3, :3])
-    mean[:3, :3] = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
-    return np.asarray(mean)
+    return np.array([se3.mean_transform(gap[:, f]) for f in range(gap.shape[1])])

@@ -8,14 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.cause.align import chain_screws
 from harness.description.dh import DHRow
 from harness.description.locate import model_folders
 from harness.difference.operands import TIP, TOOLBOX, Operand, read_operand
 from harness.errors import CrosscheckError, EngineFailed, EngineUnavailable, InputError
 from harness.kinematics.canonical import canonical
 from harness.kinematics.invariants import Difference, Matching, match
-from harness.kinematics.screws import finite_steps
+from harness.kinematics.screws import chain_screws, finite_steps
 from harness.workers.packaged_tables import packaged_tables
 
 PARALLEL = 0.02  # rad: calibrated axes are as parallel as that, and have no common normal worth the name

@@ -12,12 +12,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from types import ModuleType
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 
+from harness.description.dh import DHTable
+from harness.description.packaged import Packaged
+from harness.description.urdf import UrdfText
 from harness.errors import EngineFailed, EngineUnavailable, nearest
 from harness.se3 import Array
+
+# What an engine is built on.
+Description: TypeAlias = "DHTable | UrdfText | Packaged"
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,8 @@ from harness.description.model import RobotModel
 from harness.description.packaged import Packaged
 from harness.description.urdf import UrdfText
 from harness.engines import requirements
-from harness.engines.base import Engine
+from harness.engines.base import Description, Engine
 from harness.errors import DescriptionUnavailable, EngineUnavailable, InputError, nearest
-from harness.workers.protocol import Description
 
 GROUP = "fk_crosscheck.engines"
 REFERENCE = "dh:numpy"

@@ -159,3 +159,10 @@ def _turn_about(z: Array, a: Array, b: Array) -> float | None:
     if np.linalg.norm(a) < 1e-9:
         return None
     return math.atan2(float((np.cross(a, b) @ z).sum()), float((a * b).sum()))
+
+
+def chain_screws(T: Array, prismatic: list[bool]) -> Screws:
+    """Screws from the placements (n + 1, 4, 4) at zero and after one step of each joint."""
+    steps = finite_steps(prismatic)
+    S = np.array([log(T[i + 1] @ se3.inverse(T[0])) / steps[i] for i in range(len(prismatic))]).reshape(-1, 6)
+    return Screws(T[0], S, 0.0)

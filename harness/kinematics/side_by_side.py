@@ -9,11 +9,10 @@ from typing import Literal
 
 import numpy as np
 
-from harness.cause.align import chain_screws
 from harness.description.dh import Convention, DHRow
 from harness.kinematics.canonical import canonical
 from harness.kinematics.mechanism import Mechanism
-from harness.kinematics.screws import finite_steps
+from harness.kinematics.screws import chain_screws, finite_steps
 from harness.se3 import Array
 
 Unit = Literal["m", "rad"]

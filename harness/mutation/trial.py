@@ -18,8 +18,8 @@ from harness.mutation.structure import of_axes, of_frames
 from harness.report import document as doc
 from harness.report import explanation as reasons
 from harness.run.options import Options
-from harness.run.plan import deviation_on_file
 from harness.verdict.crosscheck import crosscheck
+from harness.verdict.deviations import deviation_on_file
 from harness.verdict.gate import FAILING
 
 SAMPLES = 200

@@ -7,8 +7,7 @@ from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 from harness.report.document import PublishedResult, Report, Source
 from harness.report.regression import Regression
 from harness.report.source_parts import FrameResult
-from harness.report.text import metres, numbers, plain, radians, why
-from harness.verdict.accepted import worsened
+from harness.report.text import metres, numbers, plain, radians, why, worsened
 
 
 def render_junit(report: Report) -> str:

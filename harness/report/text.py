@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 from harness.report.document import Source
 from harness.report.model_parts import ParameterPair
-from harness.report.regression import Changed, Moved
+from harness.report.regression import Changed, Moved, Regression
 
 MAX_SAME = 3
 
@@ -62,6 +62,13 @@ def moved_text(moved: Moved) -> str:
 def changed_text(changed: Changed) -> str:
     """`urdf:pinocchio: agrees, now disagrees`."""
     return f"{changed.what}: {changed.before}, now {changed.after}"
+
+
+def worsened(found: Regression) -> list[str]:
+    """What a strict run fails for, a line each."""
+    lines = [found.problem] if found.problem else []
+    lines += [moved_text(m) for m in found.grown]
+    return lines + [changed_text(c) for c in found.changed if c.worse]
 
 
 def numbers(values: Iterable[float], digits: int = 6) -> str:

@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from harness import se3
-from harness.cause.fit import mean_transform
 from harness.comparison.components import View, components, mapped, matrices
 from harness.description.engine_names import placement_in_base
 from harness.description.frames import MappedFrame, unchecked_joint
@@ -195,6 +194,6 @@ def measure_rigid(model: RobotModel, in_house: Bound, urdf_source: Bound, q: Arr
     for i, frame in enumerate(model.frames.frames):
         if frame.relation == "rigid" and i in T_base_link and np.isfinite(T_base_link[i]).all():
             T_dh_link = se3.inverse(T_base_dh[i]) @ T_base_link[i]
-            mean = mean_transform(T_dh_link)
+            mean = se3.mean_transform(T_dh_link)
             offsets[frame.name] = Measured(mean, float(np.abs(T_dh_link - mean).max()))
     return offsets

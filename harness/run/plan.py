@@ -15,7 +15,6 @@ from harness.engines.registry import REFERENCE, adapter_of, kind_of, registered
 from harness.errors import EngineFailed, EngineUnavailable, InputError, MappingError, nearest
 from harness.run.binding import Bound
 from harness.run.options import Options
-from harness.verdict.judge import Deviation
 
 Status: TypeAlias = Literal["ran", "not run", "failed"]
 
@@ -144,27 +143,3 @@ def pair_tolerance(a: Planned, reference: Planned) -> tuple[float, float]:
         return a.tolerance.position, a.tolerance.rotation
     own = [p.tolerance for p in (a, reference) if p.name != REFERENCE]
     return sum(t.position for t in own), sum(t.rotation for t in own)
-
-
-def deviation_on_file(model: RobotModel, source: str, reference: str, frame: str) -> tuple[Deviation, str] | None:
-    """The accepted deviation of `source` from `reference` at `frame`, and its reason.
-
-    On file it is against the in-house FK. Another reference brings its own: two sources with the same one agree.
-    """
-
-    def on_file(name: str) -> tuple[Deviation, str] | None:
-        for entry in model.file.accepted:
-            if entry.covers(name) and frame in entry.frames:
-                return Deviation(entry.position, entry.rotation, entry.within), entry.reason
-        return None
-
-    own, theirs = on_file(source), on_file(reference)
-    if theirs is None or own is None:
-        return own or theirs
-    return None
-
-
-def cause_on_file(model: RobotModel, source: str, reference: str) -> dict[tuple[str, str], float]:
-    """Which numbers explain the accepted deviations of a source, {(joint, parameter): change [m or rad]}; empty if none do."""
-    entries = [e for e in model.file.accepted if e.covers(source) != e.covers(reference)]
-    return {(joint, name): size for e in entries for joint, part in e.cause.items() for name, size in part.items()}

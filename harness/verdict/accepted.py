@@ -16,7 +16,7 @@ from harness.errors import InputError
 from harness.report.document import PublishedResult, Report, Source
 from harness.report.parts import NonNegative, Part
 from harness.report.regression import Changed, Moved, Quantity, Regression
-from harness.report.text import changed_text, moved_text
+from harness.report.text import worsened
 
 FOLDER = "accepted"
 Pair = tuple[NonNegative, NonNegative]  # position [m], rotation [rad]
@@ -128,13 +128,6 @@ def compared(report: Report, numbers: AcceptedNumbers, strict: bool) -> Report:
         sentence = f"{report.robot.name} MOVED since it was accepted: {reasons[0]}"
         update = {"exit_code": 1, "sentence": sentence, "reasons": [*reasons, *old.reasons]}
     return report.model_copy(update={"verdict": old.model_copy(update=update)})
-
-
-def worsened(found: Regression) -> list[str]:
-    """What a strict run fails for, a line each."""
-    lines = [found.problem] if found.problem else []
-    lines += [moved_text(m) for m in found.grown]
-    return lines + [changed_text(c) for c in found.changed if c.worse]
 
 
 def _gate(report: Report) -> str:

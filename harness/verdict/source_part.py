@@ -13,8 +13,9 @@ from harness.errors import CrosscheckError, EngineUnavailable, InputError
 from harness.report import document as doc
 from harness.report import source_parts as parts
 from harness.run.binding import Bound
-from harness.run.plan import Participant, cause_on_file, deviation_on_file, pair_tolerance
+from harness.run.plan import Participant, pair_tolerance
 from harness.run.results import Results
+from harness.verdict.deviations import cause_on_file, deviation_on_file
 from harness.verdict.evidence import at, certificate, explanation, pose, reproducer
 from harness.verdict.judge import FAILING, judge
 from harness.verdict.noise import CLASSES, NoiseClass, classify

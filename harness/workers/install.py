@@ -22,7 +22,7 @@ from packaging.requirements import Requirement
 from harness.description.dh import DHRow, DHTable
 from harness.description.packaged import Packaged
 from harness.description.urdf import UrdfText
-from harness.engines.base import Engine
+from harness.engines.base import Description, Engine
 from harness.engines.requirements import unmet
 from harness.errors import CrosscheckError, InputError
 from harness.workers.environments import (
@@ -36,7 +36,6 @@ from harness.workers.environments import (
     write_manifest,
 )
 from harness.workers.pool import Workers
-from harness.workers.protocol import Description
 
 Say: TypeAlias = Callable[[str], None]
 

@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import Any, TypeVar
 
 from harness.engines import requirements
-from harness.engines.base import Engine
+from harness.engines.base import Description, Engine
 from harness.errors import EngineFailed
 from harness.workers import protocol
 from harness.workers.child import Child, ChildError
@@ -72,7 +72,7 @@ class Workers:
         """Run `work` when a core is free."""
         return self._pool.submit(work)
 
-    def load(self, adapter: type[Engine], description: protocol.Description, frames: Sequence[str], python: str = "") -> Engine:
+    def load(self, adapter: type[Engine], description: Description, frames: Sequence[str], python: str = "") -> Engine:
         """An engine on `description`, answering at those of `frames` it has; run by `python`, by default the one that has it.
 
         Raises EngineUnavailable (not installed) or EngineFailed (refuses the description).

@@ -8,13 +8,14 @@ that offers it: another greeting follows.
 from __future__ import annotations
 
 import json
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from harness.description.dh import DHRow, DHTable
 from harness.description.packaged import Packaged
 from harness.description.urdf import UrdfText
+from harness.engines.base import Description
 
 PROTOCOL = "fk-crosscheck"
 VERSION = 1
@@ -22,8 +23,6 @@ MAX_BLOCK = 4096
 FAILED = -1.0
 FLOAT = np.dtype("<f8")
 AGAIN = np.zeros(1, FLOAT).tobytes()
-
-Description: TypeAlias = "DHTable | UrdfText | Packaged"
 
 
 def greeting(description: Description, frames: tuple[str, ...]) -> bytes:

@@ -25,14 +25,13 @@ from harness.description.urdf import Urdf
 from harness.description.urdf_file import parse_urdf, read_urdf
 from harness.description.urdf_lint import lint
 from harness.engines import requirements
-from harness.engines.base import Engine, Trait
+from harness.engines.base import Description, Engine, Trait
 from harness.engines.dh_numpy import DHNumpy
 from harness.engines.registry import REFERENCE, adapter_of, description_of, registered
 from harness.errors import EngineFailed, EngineUnavailable, InputError
 from harness.run.options import Options
 from harness.se3 import Array
 from harness.workers.pool import Workers
-from harness.workers.protocol import Description
 from tests.conftest import WITHOUT, engines
 from tests.helpers import assert_placements_close, crosscheck
 

@@ -13,7 +13,8 @@ from harness.description.locate import default_models_dir, find_model, locate_ur
 from harness.description.model import RobotModel, load_model
 from harness.errors import CrosscheckError, DescriptionUnavailable, InputError, ModelFileError
 from harness.run.options import Options
-from harness.run.plan import deviation_on_file, plan
+from harness.run.plan import plan
+from harness.verdict.deviations import deviation_on_file
 from tests.helpers import Edit, crosscheck
 
 NINE = ["humanoid_arm", "iiwa14", "panda", "sixr", "stanford", "ur10", "ur3", "ur5", "ur5e"]
