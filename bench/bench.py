@@ -112,7 +112,7 @@ def engine_rows(model: RobotModel) -> list[tuple[str, float, float, str]]:
 
 def overhead_row(model: RobotModel) -> tuple[str, float, float, str]:
     """Wall time of a run over the sum of the time spent inside its engines."""
-    options = Options(N, 0, ("dh:pinocchio", "urdf:pinocchio"), certify=False)
+    options = Options(samples=N, seed=0, sources=("dh:pinocchio", "urdf:pinocchio"), certify=False)
     ratios = []
     for _ in range(3):
         environment = crosscheck(model, options).environment
@@ -164,7 +164,7 @@ def certificate_rows() -> list[tuple[str, float, float, str]]:
         setattr(harness.verdict.crosscheck, "certify_all", timed)  # noqa: B010 - not exported there, on purpose
         ratios = []
         for _ in range(ROUNDS + 1):
-            crosscheck(model, Options(0, 0, ("dh:pinocchio",)))
+            crosscheck(model, Options(samples=0, seed=0, sources=("dh:pinocchio",)))
             once = min(seconds(lambda bound=bound, nodes=nodes: [b.raw(nodes) for b in bound]) for _ in range(3))  # type: ignore[misc]
             ratios.append((spent[-1] - 0.050) / once)
         print(f"certificate of {robot}: {statistics.median(spent) * 1e3:.0f} ms (median; informative)")
@@ -177,8 +177,8 @@ def certificate_rows() -> list[tuple[str, float, float, str]]:
 
 def long_chain_row() -> tuple[str, float, float, str]:
     """A 30-joint chain against the same with one link longer, link by link [s]."""
-    rows = tuple(DHRow(f"j{i}", "revolute", 0.1, math.pi / 2 * (-1) ** i, 0.05, 0.0) for i in range(30))
-    longer = (*rows[:12], DHRow("j12", "revolute", 0.1001, math.pi / 2, 0.05, 0.0), *rows[13:])
+    rows = tuple(DHRow(name=f"j{i}", kind="revolute", a=0.1, alpha=math.pi / 2 * (-1) ** i, d=0.05, theta=0.0) for i in range(30))
+    longer = (*rows[:12], DHRow(name="j12", kind="revolute", a=0.1001, alpha=math.pi / 2, d=0.05, theta=0.0), *rows[13:])
     labels = [str(i) for i in range(1, 31)]
     axes, links = [Axis(True, 1, 0.0, 2 * math.pi)] * 30, [Link(i - 1 if i else None, i, (i,)) for i in range(30)]
 

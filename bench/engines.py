@@ -32,7 +32,7 @@ def main(robot: str = "ur5", samples: str = "10000") -> int:
     """Measure one run. Returns 1 if a target is missed."""
     model = load_model(find_model(robot, default_models_dir()))
     before, start = processor_seconds(), time.perf_counter()
-    report = crosscheck(model, Options(int(samples), all_engines=True, certify=False))
+    report = crosscheck(model, Options(samples=int(samples), all_engines=True, certify=False))
     wall, busy = time.perf_counter() - start, processor_seconds() - before
     environment = report.environment
     own, waited = environment.engine_seconds, environment.waiting_seconds

@@ -75,7 +75,7 @@ def tables(draw: st.DrawFn, max_rows: int = 6) -> DHTable:
     if all(kind == "fixed" for kind in kinds):
         kinds[0] = "revolute"
     rows = tuple(
-        DHRow(f"j{i}", kind, draw(lengths), draw(angles), draw(lengths), draw(angles))  # type: ignore[arg-type]
+        DHRow(name=f"j{i}", kind=kind, a=draw(lengths), alpha=draw(angles), d=draw(lengths), theta=draw(angles))  # type: ignore[arg-type]
         for i, kind in enumerate(kinds)
     )
     return DHTable(rows, draw(st.sampled_from(["standard", "modified"])), draw(transforms), draw(transforms))

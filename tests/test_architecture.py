@@ -148,3 +148,22 @@ def test_a_worker_needs_numpy_and_the_library_alone(path: Path) -> None:
 def test_modules_hold_one_idea() -> None:
     long = {path.name: n for path in MODULES if (n := len(path.read_text().splitlines())) > LONGEST_MODULE}
     assert not long
+
+
+def positional_records(path: Path) -> list[str]:
+    """Dataclasses and named tuples of more than four fields that may be built by position."""
+    found = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        if not isinstance(node, ast.ClassDef):
+            continue
+        fields = [n for n in node.body if isinstance(n, ast.AnnAssign) and "ClassVar" not in ast.unparse(n.annotation)]
+        decorators = [ast.unparse(d) for d in node.decorator_list]
+        tuple_like = any(ast.unparse(base) == "NamedTuple" for base in node.bases)
+        by_position = any(d.startswith("dataclass") and "kw_only=True" not in d for d in decorators)
+        if len(fields) > 4 and (tuple_like or by_position):
+            found.append(node.name)
+    return found
+
+
+def test_records_of_many_fields_are_built_by_name() -> None:
+    assert {p.name: found for p in MODULES if (found := positional_records(p))} == {}

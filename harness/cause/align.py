@@ -34,7 +34,7 @@ def aligned(state: State) -> State | None:
         if sign < 0 and state.a is not None:
             P = np.diag([-1.0 if n == name else 1.0 for n in names])
             text = f"{name} turns the other way in {state.problem.sources[1]}: its sign is flipped"
-            state = state.edited(Change("sign", "between", name, text=text), mixed(state.a, P), state.b)
+            state = state.edited(Change(kind="sign", side="between", subject=name, text=text), mixed(state.a, P), state.b)
     offsets = zero_offsets(rows[0], rows[1], matching)
     zeros = {}
     for name, slides, offset in zip(names, prismatic, offsets, strict=True):

@@ -30,7 +30,7 @@ def structural(state: State) -> Iterator[State]:
     source, reference = state.problem.sources[1], state.problem.sources[0]
     text = f"{source} gives inverse transforms: its placements are those of the base in the frame, seen from {reference}"
     if not state.inverse:
-        yield state.edited(Change("inverse", "source", text=text), state.a, state.b, inverse=True)
+        yield state.edited(Change(kind="inverse", side="source", text=text), state.a, state.b, inverse=True)
 
 
 def fine(state: State) -> Iterator[State]:
@@ -50,24 +50,30 @@ def _of_joints(state: State) -> Iterator[tuple[Change, Recipe]]:
         P = np.eye(n)
         P[i, i] = -1.0
         text = f"{joint} turns the other way in {source}: its sign is flipped"
-        yield Change("sign", "between", joint, text=text), mixed(state.a, P)
+        yield Change(kind="sign", side="between", subject=joint, text=text), mixed(state.a, P)
     for i in range(n):
         for j in range(i + 1, n):
             if slides[i] == slides[j]:
                 P = np.eye(n)
                 P[[i, j]] = P[[j, i]]
                 text = f"{joints[i]} and {joints[j]} are exchanged in {source}: the joint order differs"
-                yield Change("order", "between", joints[i], joints[j], text=text), mixed(state.a, P)
+                yield Change(kind="order", side="between", subject=joints[i], parameter=joints[j], text=text), mixed(state.a, P)
     if n > 2:
         text = f"the joints are in reverse order in {source}"
-        yield Change("order", "between", "all", "reversed", text=text), mixed(state.a, np.eye(n)[::-1])
+        yield (
+            Change(kind="order", side="between", subject="all", parameter="reversed", text=text),
+            mixed(state.a, np.eye(n)[::-1]),
+        )
     for i, j in permutations(range(n), 2):
         for factor in (1.0, -1.0):
             P = np.eye(n)
             P[i, j] = factor
             sign = "+" if factor > 0 else "-"
             text = f"{joints[i]} is coupled in {source}: it moves by {joints[i]} {sign} {joints[j]}"
-            yield Change("coupling", "between", joints[i], joints[j], factor, text=text), mixed(state.a, P)
+            yield (
+                Change(kind="coupling", side="between", subject=joints[i], parameter=joints[j], size=factor, text=text),
+                mixed(state.a, P),
+            )
     turns = ~np.array(slides, dtype=bool)
     if turns.any():
         for factor, how in (
@@ -75,17 +81,20 @@ def _of_joints(state: State) -> Iterator[tuple[Change, Recipe]]:
             (DEGREES, "reads degrees as radians: its joint values are 57.3 times too large"),
         ):
             text = f"degrees: {source} {how}"
-            yield Change("degrees", "source", "q", size=factor, text=text), mixed(state.a, np.diag(np.where(turns, factor, 1.0)))
+            yield (
+                Change(kind="degrees", side="source", subject="q", size=factor, text=text),
+                mixed(state.a, np.diag(np.where(turns, factor, 1.0))),
+            )
 
 
 def _of_recipe(recipe: Recipe | None, end: End, label: str, state: State) -> Iterator[tuple[Change, Recipe]]:
     if recipe is None:
         return
     for factor, unit in ((1000.0, "metres where millimetres are meant"), (0.001, "millimetres where metres are meant")):
-        change = Change("millimetres", end, size=factor, text=f"lengths of {label} are in {unit}: a factor of 1000")
+        change = Change(kind="millimetres", side=end, size=factor, text=f"lengths of {label} are in {unit}: a factor of 1000")
         yield change, _scaled(recipe, factor, 1.0)
     for factor, unit in ((DEGREES, "radians where degrees are meant"), (1.0 / DEGREES, "degrees where radians are meant")):
-        change = Change("degrees", end, "description", size=factor, text=f"angles of {label} are in {unit}")
+        change = Change(kind="degrees", side=end, subject="description", size=factor, text=f"angles of {label} are in {unit}")
         yield change, _scaled(recipe, 1.0, factor)
     if isinstance(recipe, TableRecipe):
         yield from _of_table(recipe, end, label, state.problem.sources[1])
@@ -109,19 +118,22 @@ def _of_table(recipe: TableRecipe, end: End, label: str, source: str) -> Iterato
     table = recipe.table
     other: Convention = "modified" if table.convention == "standard" else "standard"
     text = f"convention: {label} reads its rows as {table.convention} DH; as {other} DH they agree"
-    yield Change("convention", end, text=text), replace(recipe, table=replace(table, convention=other))
+    yield Change(kind="convention", side=end, text=text), replace(recipe, table=replace(table, convention=other))
     if not recipe.backwards:
         text = f"{source} multiplies in reverse order: T = A T instead of T A"
-        yield Change("reversed", "source", text=text), replace(recipe, backwards=True)
+        yield Change(kind="reversed", side="source", text=text), replace(recipe, backwards=True)
     if not np.array_equal(table.tool, np.eye(4)):
         text = f"tool: {source} leaves the tool transform of {label} out"
-        yield Change("tool left out", end, "tool", text=text), replace(recipe, table=replace(table, tool=np.eye(4)))
+        yield (
+            Change(kind="tool left out", side=end, subject="tool", text=text),
+            replace(recipe, table=replace(table, tool=np.eye(4))),
+        )
     last = table.rows[-1]
     if last.kind == "fixed" and (last.a or last.d or last.alpha or last.theta):
-        bare = DHRow(last.name, last.kind, 0.0, 0.0, 0.0, 0.0)
+        bare = DHRow(name=last.name, kind=last.kind, a=0.0, alpha=0.0, d=0.0, theta=0.0)
         text = f"tool: {source} leaves the last row of {label}, {last.name}, out"
         yield (
-            Change("tool left out", end, last.name, text=text),
+            Change(kind="tool left out", side=end, subject=last.name, text=text),
             replace(recipe, table=replace(table, rows=(*table.rows[:-1], bare))),
         )
 
@@ -137,7 +149,7 @@ def _of_urdf(recipe: UrdfRecipe, end: End, label: str, other: str) -> Iterator[t
             written = "no axis, which means x" if joint.axis is None else f"axis {' '.join(f'{x:g}' for x in joint.axis)}"
             for sign in (1.0, -1.0):
                 text = f"axis of {joint.name}: {label} has {written}; with {'-' if sign < 0 else ''}{letter} it agrees"
-                change = Change("axis", end, joint.name, letter, sign, text=text)
+                change = Change(kind="axis", side=end, subject=joint.name, parameter=letter, size=sign, text=text)
                 yield change, recipe.with_joint(joint.name, axis=tuple(sign * x for x in axis))
 
     for joint in recipe.urdf.joint_list:
@@ -145,7 +157,10 @@ def _of_urdf(recipe: UrdfRecipe, end: End, label: str, other: str) -> Iterator[t
         if at_the_end and any((*joint.xyz, *joint.rpy)):
             text = f"tool: {other} leaves out what {label} has behind the arm, the origin of {joint.name}"
             zero = (0.0, 0.0, 0.0)
-            yield Change("tool left out", end, joint.name, text=text), recipe.with_joint(joint.name, xyz=zero, rpy=zero)
+            yield (
+                Change(kind="tool left out", side=end, subject=joint.name, text=text),
+                recipe.with_joint(joint.name, xyz=zero, rpy=zero),
+            )
 
 
 def _of_digits(recipe: Recipe | None, label: str, end: End) -> Iterator[tuple[Change, Recipe]]:
@@ -155,19 +170,19 @@ def _of_digits(recipe: Recipe | None, label: str, end: End) -> Iterator[tuple[Ch
     exact, cut = _angles(recipe, _uncut)
     if cut:
         text = f"truncated pi: {label} writes {', '.join(cut[:3])} where a multiple of pi is meant"
-        yield Change("truncated pi", end, text=text), exact
+        yield Change(kind="truncated pi", side=end, text=text), exact
     for pi in CUT:
         short, which = _angles(recipe, lambda x, pi=pi: _cut(x, pi))  # type: ignore[misc]
         if which:
             text = f"truncated pi: with pi cut to {pi:g} in {label} both agree"
-            yield Change("truncated pi", end, size=pi, text=text), short
+            yield Change(kind="truncated pi", side=end, size=pi, text=text), short
     text = f"float32: with the numbers of {label} rounded to float32 both agree"
-    yield Change("float32", end, size=32.0, text=text), _numbers(recipe, lambda x, angle: float(np.float32(x)))
+    yield Change(kind="float32", side=end, size=32.0, text=text), _numbers(recipe, lambda x, angle: float(np.float32(x)))
     numbers: list[float] = []
     exact_there = _numbers(recipe, lambda x, angle: numbers.append(x) or _written_out(x, angle))  # type: ignore[func-returns-value]
     if numbers and all(float(np.float32(x)) == x for x in numbers):
         text = f"float32: the numbers of {label} are float32; written out in full they agree"
-        yield Change("float32", end, size=64.0, text=text), exact_there
+        yield Change(kind="float32", side=end, size=64.0, text=text), exact_there
 
 
 def _written_out(x: float, angle: bool) -> float:

@@ -21,7 +21,7 @@ _PLAIN = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Change:
     """One change that a repair makes.
 
@@ -76,7 +76,16 @@ def of_parameter(
         # A table has no `origin z`: of a number of b it is said what would fit a, not that it stood there.
         other = f"{there} in {wanted_by}" if side == "a" else f"{there} would fit {wanted_by}"
         text = f"{parameter.name} of {parameter.owner}: {here} in {label}, {other} ({by})"
-    return Change("parameter", side, parameter.owner, parameter.name, size, before, unit, text)
+    return Change(
+        kind="parameter",
+        side=side,
+        subject=parameter.owner,
+        parameter=parameter.name,
+        size=size,
+        before=before,
+        unit=unit,
+        text=text,
+    )
 
 
 def amount(x: float, unit: str) -> str:

@@ -35,18 +35,23 @@ def _read_as_specified(state: State, b: UrdfRecipe) -> Iterator[State]:
     if reading.default_axis != SPECIFIED.default_axis:
         bare = [j.name for j in b.urdf.joint_list if j.axis is None and j.name in b.joints.names]
         text = f"axis default: {source} takes the missing axis of {', '.join(bare)} for z; the specification says x"
-        change = Change("axis default", "source", ", ".join(bare), text=text)
+        change = Change(kind="axis default", side="source", subject=", ".join(bare), text=text)
         yield state.edited(change, state.a, replace(b, reading=replace(reading, default_axis=SPECIFIED.default_axis)))
     if reading.stretched:
         text = f"axis length: {source} multiplies the travel of prismatic joints by the length of their axis"
-        change = Change("axis length", "source", text=text)
+        change = Change(kind="axis length", side="source", text=text)
         yield state.edited(change, state.a, replace(b, reading=replace(reading, stretched=False)))
     if not reading.mimic:
         names = ", ".join(b.joints.followers)
-        change = Change("mimic", "source", names, text=f"mimic: {source} leaves {names} at zero, which should follow its leader")
+        change = Change(
+            kind="mimic",
+            side="source",
+            subject=names,
+            text=f"mimic: {source} leaves {names} at zero, which should follow its leader",
+        )
         yield state.edited(change, state.a, replace(b, reading=replace(reading, mimic=True)))
     if reading.float32:
-        change = Change("float32", "source", text=f"float32: {source} keeps joint origins as float32")
+        change = Change(kind="float32", side="source", text=f"float32: {source} keeps joint origins as float32")
         yield state.edited(change, state.a, replace(b, reading=replace(reading, float32=False)))
 
 
@@ -76,7 +81,7 @@ def _other_base(state: State, b: UrdfRecipe, links: Mapping[str, Array]) -> Iter
     for link, T in links.items():
         if link != b.base and _constant(T) and _differ(T, eye):
             text = f"base frame: with placements in {link} instead of {b.base} both agree"
-            change = Change("base frame", "between", b.base, link, text=text)
+            change = Change(kind="base frame", side="between", subject=b.base, parameter=link, text=text)
             yield state.edited(change, state.a, replace(b, base=link, frames=_exchanged(b.frames, b.base, link)))
 
 
@@ -96,13 +101,13 @@ def _other_links(state: State, b: UrdfRecipe, links: Mapping[str, Array]) -> Ite
             if not fits and not _constant(se3.inverse(links[here]) @ T):
                 continue
             text = f"frame {name}: {link} is meant where {here} is mapped"
-            change = Change("frame", "between", name, link, text=text)
+            change = Change(kind="frame", side="between", subject=name, parameter=link, text=text)
             yield state.edited(change, state.a, replace(b, frames={**b.frames, name: link}))
             if link in b.frames.values():
                 pair = sorted((name, next(n for n, at in b.frames.items() if at == link)))
                 both = f"{b.frames[pair[0]]} and {b.frames[pair[1]]}"
                 text = f"frames {pair[0]} and {pair[1]}: their links {both} are exchanged"
-                change = Change("frame", "between", pair[0], pair[1], text=text)
+                change = Change(kind="frame", side="between", subject=pair[0], parameter=pair[1], text=text)
                 yield state.edited(change, state.a, replace(b, frames=_exchanged(b.frames, here, link)))
 
 
@@ -122,5 +127,5 @@ def _other_labels(state: State, a: TableRecipe) -> Iterator[State]:
         for k, label in enumerate(labels):
             if label != here and max(fit.errors(placed[:, k] @ offset, T_b[:, i])) <= max(state.problem.tolerance):
                 text = f"frame {name}: DH frame {label} is meant where {here} is mapped"
-                change = Change("frame", "between", name, label, text=text)
+                change = Change(kind="frame", side="between", subject=name, parameter=label, text=text)
                 yield state.edited(change, replace(a, frames={**a.frames, name: (label, offset)}), state.b)

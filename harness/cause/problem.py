@@ -36,7 +36,7 @@ class Seen:
     b: Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Problem:
     """a is the reference, b the source; a recipe is None if that one does not compute what its description says.
 
@@ -89,7 +89,7 @@ class Problem:
         return max(0.1, float(np.linalg.norm(self.seen.a[..., :3, 3], axis=-1).max()))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class State:
     """A problem with some repairs made: recipes edited, numbers shifted [m or rad], one side's placements inverted."""
 
@@ -103,7 +103,7 @@ class State:
     @classmethod
     def start(cls, problem: Problem) -> State:
         """Nothing repaired yet."""
-        return cls(problem, problem.a, problem.b)
+        return cls(problem=problem, a=problem.a, b=problem.b)
 
     @property
     def size(self) -> int:

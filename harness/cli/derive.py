@@ -63,7 +63,7 @@ def verify(derived: Derived, name: str, source: str, out: Path | None) -> Report
     """Write the robot model (to a temporary folder, if `out` is None), read it back and cross-check it, with a certificate."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = write_model(derived, name, source, out or Path(temporary))
-        return crosscheck(load_model(folder), Options(SAMPLES, 0, (source,)))
+        return crosscheck(load_model(folder), Options(samples=SAMPLES, seed=0, sources=(source,)))
 
 
 def _show(derived: Derived) -> None:

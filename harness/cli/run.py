@@ -142,7 +142,20 @@ def run(
     these, the smallest.
     """
     limits = Limits(start_timeout, block_timeout, memory_limit * 2**30)
-    options = Options(samples, seed, sources, reference, "", certify, explain, all_engines, workers, limits, jobs, in_process)
+    options = Options(
+        samples=samples,
+        seed=seed,
+        sources=sources,
+        reference=reference,
+        command="",
+        certify=certify,
+        explain=explain,
+        all_engines=all_engines,
+        workers=workers,
+        limits=limits,
+        jobs=jobs,
+        in_process=in_process,
+    )
     folders = folders_of(robots, models or default_models_dir())
     prepare(out)
     codes: list[int] = []

@@ -58,7 +58,7 @@ def view(
     except ImportError as error:
         raise EngineUnavailable("view", f"import viser failed: {error}", "pip install 'fk-crosscheck[view]'") from None
     model = load_model(find_model(robot, models or default_models_dir()))
-    options = Options(samples, seed, sources, reference, certify=False, explain=False)
+    options = Options(samples=samples, seed=seed, sources=sources, reference=reference, certify=False, explain=False)
     logging.getLogger("websockets").setLevel(logging.ERROR)  # a browser that goes away is no error of ours
     with options.workshop() as workshop:
         session = Session(model, options, workshop)

@@ -28,7 +28,7 @@ SAME = 1e-9  # batches round differently from single configurations, float32 ori
 HUGE = 1e100  # beyond this a length is as good as infinite: its square would be
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Validity:
     """Whether a source's placements are placements: finite, last row 0 0 0 1, rotation in SO(3) to within `VALID`.
 

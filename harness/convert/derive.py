@@ -31,7 +31,7 @@ class DerivedLink:
     offset: Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Derived:
     """A DH table, the links of the chain, the free directions fixed by choice, and how well the screws rebuild the chain."""
 
@@ -68,10 +68,21 @@ def derive(urdf: Urdf, base: str, tip: str, convention: Convention, source: str)
     except ValueError as error:
         raise UrdfError(f"no DH table: {error}", where=urdf.path) from None
     rows = tuple(
-        DHRow(r.name, r.kind, tidy_length(r.a), tidy_angle(r.alpha), tidy_length(r.d), tidy_angle(r.theta)) for r in form.rows
+        DHRow(
+            name=r.name, kind=r.kind, a=tidy_length(r.a), alpha=tidy_angle(r.alpha), d=tidy_length(r.d), theta=tidy_angle(r.theta)
+        )
+        for r in form.rows
     )
     table = DHTable(rows, convention, tidy_transform(form.base), tidy_transform(form.tool))
-    return Derived(urdf, table, base, tip, _links(path, base, table, place), form.free, found.residual)
+    return Derived(
+        urdf=urdf,
+        table=table,
+        base=base,
+        tip=tip,
+        links=_links(path, base, table, place),
+        free=form.free,
+        residual=found.residual,
+    )
 
 
 def _chain_joints(urdf: Urdf, path: tuple[UrdfJoint, ...], base: str, tip: str) -> list[UrdfJoint]:

@@ -10,6 +10,7 @@ T_base_tool = base A_1 ... A_n tool.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
@@ -21,7 +22,7 @@ Convention: TypeAlias = Literal["standard", "modified"]
 Kind: TypeAlias = Literal["revolute", "prismatic", "fixed"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class DHRow:
     """One row: `a`, `d` [m], `alpha`, `theta` [rad]; theta (d, if prismatic) is the offset added to q."""
 
@@ -31,6 +32,12 @@ class DHRow:
     alpha: float
     d: float
     theta: float
+
+    @classmethod
+    def of(cls, name: str, kind: Kind, numbers: Iterable[float]) -> DHRow:
+        """A row from its numbers in the order of the columns: a [m], alpha [rad], d [m], theta [rad]. Raises ValueError."""
+        a, alpha, d, theta = (float(x) for x in numbers)
+        return cls(name=name, kind=kind, a=a, alpha=alpha, d=d, theta=theta)
 
 
 @dataclass(frozen=True)

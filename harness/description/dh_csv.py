@@ -96,7 +96,7 @@ def _row(header: list[str], cells: list[str], path: Path, line: int, suspects: l
             raise ModelFileError(str(error), where=path, line=line, key=f"column {column!r}") from None
         if column in ("alpha", "theta") and (why := _suspect_angle(text.get(column, ""), numbers[column])):
             suspects.append(SuspectNumber(f"{path.name}:{line}: {text['joint']} {column}", why))
-    return DHRow(text["joint"], cast(Kind, kind), **numbers)
+    return DHRow(name=text["joint"], kind=cast(Kind, kind), **numbers)
 
 
 def _suspect_angle(text: str, value: float) -> str | None:

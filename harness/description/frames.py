@@ -26,7 +26,7 @@ from harness.se3 import Array
 Relation = Literal["identical", "declared", "rigid"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MappedFrame:
     """A frame under one name: `T_base_name = T_base_dh @ offset`, and the link `urdf` is the same frame.
 
@@ -120,9 +120,11 @@ def _resolve(entry: FrameEntry, i: int, file: FramesFile, table: DHTable, path: 
             f"no DH frame {label!r} in dh.csv: expected base, 0 to {len(table.rows)}, or tool", where=path, key=f"frame[{i}].dh"
         )
     if entry.rigid:
-        return MappedFrame(entry.name, label, entry.urdf, "rigid", None, None)
+        return MappedFrame(name=entry.name, dh=label, urdf=entry.urdf, relation="rigid", of=None, offset=None)
     declared = entry.of is not None or entry.xyz is not None or entry.rpy is not None
-    return MappedFrame(entry.name, label, entry.urdf, "declared" if declared else "identical", entry.of, offset)
+    return MappedFrame(
+        name=entry.name, dh=label, urdf=entry.urdf, relation="declared" if declared else "identical", of=entry.of, offset=offset
+    )
 
 
 def _base(frames: list[MappedFrame], table: DHTable, path: Path) -> MappedFrame:

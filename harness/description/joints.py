@@ -17,7 +17,7 @@ from harness.errors import MappingError, UrdfError, nearest
 from harness.se3 import Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class JointMap:
     """Affine map from the model's q (N, n) to every movable joint of a description, by name.
 
@@ -60,7 +60,7 @@ class JointMap:
 def identity_map(table: DHTable) -> JointMap:
     """The joints of the model as they are: what DH sources take."""
     n = len(table.joints)
-    return JointMap(table.joints, np.eye(n), np.zeros(n))
+    return JointMap(names=table.joints, A=np.eye(n), b=np.zeros(n))
 
 
 def resolve_joints(entries: Mapping[str, JointEntry], table: DHTable, urdf: Urdf, frames: FrameMap, path: Path) -> JointMap:

@@ -132,7 +132,7 @@ class ModelFile(Strict):
         return name
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RobotModel:
     """A robot model, read and checked against itself."""
 
@@ -217,7 +217,19 @@ def load_model(folder: Path) -> RobotModel:
     hashes = {name: _sha256(path) for name, path in paths.items()}
     if file.urdf is not None and urdf_path is not None:
         hashes[f"{file.urdf.package or 'urdf'}:{file.urdf.file}"] = _sha256(urdf_path)
-    return RobotModel(folder, file, table, urdf, frames, joints, frames_file.engine, configurations, findings, suspects, hashes)
+    return RobotModel(
+        folder=folder,
+        file=file,
+        table=table,
+        urdf=urdf,
+        frames=frames,
+        urdf_joints=joints,
+        engine_names=frames_file.engine,
+        configurations=configurations,
+        findings=findings,
+        suspects=suspects,
+        hashes=hashes,
+    )
 
 
 def _check_sources(file: ModelFile, frames: FrameMap, path: Path) -> None:

@@ -51,7 +51,7 @@ class PublishedEntry(Strict):
         return self
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Published:
     """A claim in radians and metres: `position` (3,), `rotation` (3, 3) or None if only a position is claimed."""
 

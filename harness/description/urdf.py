@@ -22,7 +22,7 @@ class Mimic(NamedTuple):
     offset: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class UrdfJoint:
     """One joint as written; `axis` is None if the file has none, `texts` holds the numbers as text for the lint."""
 

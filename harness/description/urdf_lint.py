@@ -18,7 +18,7 @@ from harness.errors import UrdfError, nearest
 MAX_DEPTH = 1_000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Finding:
     """One lint result. `error`: not a kinematic tree, refused; `warning`: engines are known to differ on it; `note`."""
 
@@ -57,11 +57,11 @@ def _names(urdf: Urdf) -> Iterator[Finding]:
                 counts[item.name] = 0
                 what = code.removeprefix("duplicate-")
                 yield Finding(
-                    code,
-                    "error",
-                    item.name,
-                    f"{what} name {item.name!r} is used on lines {', '.join(lines)}",
-                    item.line,
+                    code=code,
+                    level="error",
+                    subject=item.name,
+                    message=f"{what} name {item.name!r} is used on lines {', '.join(lines)}",
+                    line=item.line,
                 )
 
 
@@ -72,25 +72,25 @@ def _structure(urdf: Urdf) -> Iterator[Finding]:
         for role, link in (("parent", joint.parent), ("child", joint.child)):
             if link not in links:
                 message = f"joint {joint.name!r} names {role} link {link!r}, which does not exist; {nearest(link, links)}"
-                yield Finding("unknown-link", "error", joint.name, message, joint.line)
+                yield Finding(code="unknown-link", level="error", subject=joint.name, message=message, line=joint.line)
         if joint.child in above:
             message = f"link {joint.child!r} has two parents: joints {above[joint.child].name!r} and {joint.name!r}"
-            yield Finding("two-parents", "error", joint.child, message, joint.line)
+            yield Finding(code="two-parents", level="error", subject=joint.child, message=message, line=joint.line)
         above.setdefault(joint.child, joint)
     depth = _depths(urdf, above)
     in_cycle = [link for link in urdf.link_list if link.name not in depth]
     if in_cycle:
         names = ", ".join(link.name for link in in_cycle[:5])
         message = f"{len(in_cycle)} links cannot be reached from any root, they hang on a cycle: {names}"
-        yield Finding("cycle", "error", in_cycle[0].name, message, in_cycle[0].line)
+        yield Finding(code="cycle", level="error", subject=in_cycle[0].name, message=message, line=in_cycle[0].line)
     if depth and max(depth.values()) > MAX_DEPTH:
         deepest = max(depth, key=lambda name: depth[name])
         message = f"expected a tree at most {MAX_DEPTH} joints deep, got {depth[deepest]}"
-        yield Finding("too-deep", "error", deepest, message, 0)
+        yield Finding(code="too-deep", level="error", subject=deepest, message=message, line=0)
     for root in urdf.roots[1:]:
         line = next(link.line for link in urdf.link_list if link.name == root)
         message = f"link {root!r} cannot be reached from the root {urdf.roots[0]!r}: no joint has it as its child"
-        yield Finding("unreachable-link", "error", root, message, line)
+        yield Finding(code="unreachable-link", level="error", subject=root, message=message, line=line)
 
 
 def _depths(urdf: Urdf, above: dict[str, UrdfJoint]) -> dict[str, int]:
@@ -111,24 +111,26 @@ def _axis(joint: UrdfJoint) -> Iterator[Finding]:
         return
     if joint.type in UNSUPPORTED:
         message = f"joint {joint.name!r} is {joint.type}: engines read it differently, and no DH row matches it"
-        yield Finding("unsupported-joint", "warning", joint.name, message, joint.line)
+        yield Finding(code="unsupported-joint", level="warning", subject=joint.name, message=message, line=joint.line)
         return
     if joint.axis is None:
         message = f"joint {joint.name!r} has no <axis>: x by the specification, z in some engines"
-        yield Finding("missing-axis", "warning", joint.name, message, joint.line)
+        yield Finding(code="missing-axis", level="warning", subject=joint.name, message=message, line=joint.line)
         return
     length = math.sqrt(sum(x * x for x in joint.axis))
     text = " ".join(f"{x:g}" for x in joint.axis)
     if length == 0.0:
-        yield Finding("zero-axis", "error", joint.name, f"joint {joint.name!r} has axis {text}", joint.line)
+        yield Finding(
+            code="zero-axis", level="error", subject=joint.name, message=f"joint {joint.name!r} has axis {text}", line=joint.line
+        )
         return
     # Files write 0.7071 0.7071 0 and mean a unit vector; engines differ as soon as it is off by more than rounding.
     if abs(length - 1.0) > 1e-12:
         message = f"joint {joint.name!r} has axis {text} of length {length:.9g}: some engines scale the travel by it"
-        yield Finding("unnormalised-axis", "warning", joint.name, message, joint.line)
+        yield Finding(code="unnormalised-axis", level="warning", subject=joint.name, message=message, line=joint.line)
     if sum(x != 0.0 for x in joint.axis) > 1:
         message = f"joint {joint.name!r} has the oblique axis {text}: some engines turn it the wrong way"
-        yield Finding("oblique-axis", "note", joint.name, message, joint.line)
+        yield Finding(code="oblique-axis", level="note", subject=joint.name, message=message, line=joint.line)
 
 
 def _mimic(urdf: Urdf, joint: UrdfJoint) -> Iterator[Finding]:
@@ -138,17 +140,19 @@ def _mimic(urdf: Urdf, joint: UrdfJoint) -> Iterator[Finding]:
     if leader is None:
         hint = nearest(joint.mimic.joint, urdf.joints)
         message = f"joint {joint.name!r} mimics {joint.mimic.joint!r}, which does not exist; {hint}"
-        yield Finding("unknown-mimic", "error", joint.name, message, joint.line)
+        yield Finding(code="unknown-mimic", level="error", subject=joint.name, message=message, line=joint.line)
         return
     seen = [joint.name]
     while leader is not None and leader.mimic is not None and leader.name not in seen:
         seen.append(leader.name)
         leader = urdf.joints.get(leader.mimic.joint)
     if leader is not None and leader.name in seen:
-        yield Finding("mimic-cycle", "error", joint.name, f"joint {joint.name!r} mimics itself", joint.line)
+        yield Finding(
+            code="mimic-cycle", level="error", subject=joint.name, message=f"joint {joint.name!r} mimics itself", line=joint.line
+        )
         return
     message = f"joint {joint.name!r} mimics {joint.mimic.joint!r}: nine of eleven engines ignore that"
-    yield Finding("mimic", "warning", joint.name, message, joint.line)
+    yield Finding(code="mimic", level="warning", subject=joint.name, message=message, line=joint.line)
 
 
 def _numbers(joint: UrdfJoint) -> Iterator[Finding]:
@@ -160,4 +164,4 @@ def _numbers(joint: UrdfJoint) -> Iterator[Finding]:
                 message = (
                     f"joint {joint.name!r} {where}: {word} is {truncation.exact} cut short, off by {truncation.error:.1e} rad"
                 )
-                yield Finding("truncated-pi", "note", joint.name, message, joint.line)
+                yield Finding(code="truncated-pi", level="note", subject=joint.name, message=message, line=joint.line)

@@ -28,7 +28,7 @@ GRID = 4096
 SLIDE = 0.5  # m, range of prismatic joints
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Diff:
     """What was found. errors, bound: largest discrepancy seen, and proven for all configurations (None if not), [m], [rad]."""
 
@@ -67,7 +67,17 @@ def diff(a: Operand, b: Operand, tolerance: tuple[float, float]) -> Diff:
     matching = match(standard[0], standard[1]) if all(standard) else None
     bound = _bound(problem)
     return Diff(
-        a, b, names, (errors[0], errors[1]), bound, same, found, unexplained, convention, (tables[0], tables[1]), matching
+        a=a,
+        b=b,
+        joints=names,
+        errors=(errors[0], errors[1]),
+        bound=bound,
+        same=same,
+        explanation=found,
+        unexplained=unexplained,
+        convention=convention,
+        tables=(tables[0], tables[1]),
+        matching=matching,
     )
 
 
@@ -85,7 +95,19 @@ def _problem(a: Operand, b: Operand, names: dict[str, str], tolerance: tuple[flo
     T = [recipe.mechanism.placements(q, (TIP,)) for recipe in recipes]
     seen, check = (Seen(q[part], T[0][part], T[1][part]) for part in (slice(FITTED), slice(FITTED, None)))
     labels = (a.name, b.name) if a.name != b.name else (a.label, b.label)
-    return Problem(recipes[0], recipes[1], (TIP,), frozenset(), seen, check, tolerance, {}, labels, labels, labels)
+    return Problem(
+        a=recipes[0],
+        b=recipes[1],
+        names=(TIP,),
+        rigid=frozenset(),
+        seen=seen,
+        check=check,
+        tolerance=tolerance,
+        behind={},
+        labels=labels,
+        sources=labels,
+        engines=labels,
+    )
 
 
 def _configurations(prismatic: Sequence[bool]) -> Array:

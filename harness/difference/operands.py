@@ -24,7 +24,7 @@ TIP = "tip"
 TOOLBOX = "roboticstoolbox:"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Operand:
     """One mechanism from a base to a tip: a DH table, or a chain of a URDF."""
 
@@ -51,7 +51,15 @@ class Operand:
         kinds = dict(zip(self.joints, self.prismatic, strict=True))
         slides = tuple(kinds[names[joint]] for joint in order)
         joints = complete(rows, self.urdf, len(order))
-        return UrdfRecipe(self.urdf, self.base, {TIP: self.tip}, joints, tuple(order), slides, gauge=gauge)
+        return UrdfRecipe(
+            urdf=self.urdf,
+            base=self.base,
+            frames={TIP: self.tip},
+            joints=joints,
+            model_joints=tuple(order),
+            prismatic=slides,
+            gauge=gauge,
+        )
 
 
 def read_operand(text: str, models: Path, base: str | None, tip: str | None, convention: Convention) -> Operand:
@@ -77,7 +85,9 @@ def read_operand(text: str, models: Path, base: str | None, tip: str | None, con
 def _of_table(table: DHTable, name: str) -> Operand:
     if not table.joints:
         raise InputError("expected at least one joint that moves, every row is fixed", where=name)
-    return Operand(name, table.joints, tuple(table.kind(j) == "prismatic" for j in table.joints), table=table)
+    return Operand(
+        name=name, joints=table.joints, prismatic=tuple(table.kind(j) == "prismatic" for j in table.joints), table=table
+    )
 
 
 def _of_urdf(path: Path, base: str | None, tip: str | None) -> Operand:
@@ -95,7 +105,7 @@ def _of_urdf(path: Path, base: str | None, tip: str | None) -> Operand:
     if not leaders:
         raise InputError(f"nothing moves between {base!r} and {tip!r}", where=path, hint="choose --base and --tip")
     kinds = tuple(joint.type == "prismatic" for joint in leaders.values())
-    return Operand(path.name, tuple(leaders), kinds, urdf=urdf, base=base, tip=tip)
+    return Operand(name=path.name, joints=tuple(leaders), prismatic=kinds, urdf=urdf, base=base, tip=tip)
 
 
 def only_leaf(urdf: Urdf) -> str:

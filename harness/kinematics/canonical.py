@@ -167,10 +167,10 @@ def _last(axis: _Axis, M: Array, convention: Convention) -> Array:
 def _standard_row(name: str, A: Array, prismatic: bool) -> DHRow:
     theta, alpha = math.atan2(A[1, 0], A[0, 0]), math.atan2(A[2, 1], A[2, 2])
     a = float(A[0, 3] * math.cos(theta) + A[1, 3] * math.sin(theta))
-    return DHRow(name, "prismatic" if prismatic else "revolute", a, alpha, float(A[2, 3]), theta)
+    return DHRow(name=name, kind="prismatic" if prismatic else "revolute", a=a, alpha=alpha, d=float(A[2, 3]), theta=theta)
 
 
 def _modified_row(name: str, A: Array, prismatic: bool) -> DHRow:
     theta, alpha = math.atan2(-A[0, 1], A[0, 0]), math.atan2(-A[1, 2], A[2, 2])
     d = float(A[2, 3] * math.cos(alpha) - A[1, 3] * math.sin(alpha))
-    return DHRow(name, "prismatic" if prismatic else "revolute", float(A[0, 3]), alpha, d, theta)
+    return DHRow(name=name, kind="prismatic" if prismatic else "revolute", a=float(A[0, 3]), alpha=alpha, d=d, theta=theta)

@@ -29,7 +29,7 @@ def of_table(table: DHTable, frames: Mapping[str, tuple[str, Array]], backwards:
     """
     if backwards:
         return _backwards(table, frames)
-    factors = [Factor(-1, T=table.base)]
+    factors = [Factor(parent=-1, T=table.base)]
     at, joint = {"base": -1, "0": 0}, 0
     end = gauge(factors, 0, "base")
     for i, row in enumerate(table.rows, start=1):
@@ -37,7 +37,7 @@ def of_table(table: DHTable, frames: Mapping[str, tuple[str, Array]], backwards:
         joint += row.kind != "fixed"
         at[str(i)] = end
     end = gauge(factors, end, "tool")
-    factors.append(Factor(end, T=table.tool))
+    factors.append(Factor(parent=end, T=table.tool))
     at["tool"] = len(factors) - 1
     if all(label != "tool" for label, _ in frames.values()):
         at[str(len(table.rows))] = end  # the last row's frame is the tool
@@ -46,8 +46,8 @@ def of_table(table: DHTable, frames: Mapping[str, tuple[str, Array]], backwards:
 
 def gauge(factors: list[Factor], parent: int, owner: str) -> int:
     """Append a transform that is the identity, with its six numbers as parameters; returns the last factor's index."""
-    moves = [Factor(0, False, axis, parameter=Parameter(owner, f"move {axis}", "m")) for axis in "xyz"]
-    turns = [Factor(0, True, axis, parameter=Parameter(owner, f"turn {axis}", "rad")) for axis in "zyx"]
+    moves = [Factor(parent=0, turns=False, axis=axis, parameter=Parameter(owner, f"move {axis}", "m")) for axis in "xyz"]
+    turns = [Factor(parent=0, turns=True, axis=axis, parameter=Parameter(owner, f"turn {axis}", "rad")) for axis in "zyx"]
     return _chained(factors, parent, [*moves, *turns])
 
 
@@ -68,12 +68,12 @@ def _backwards(table: DHTable, frames: Mapping[str, tuple[str, Array]]) -> Mecha
         count = len(table.rows) if label == "tool" else int(label)
         end = -1
         if label == "tool":
-            factors.append(Factor(-1, T=table.tool))
+            factors.append(Factor(parent=-1, T=table.tool))
             end = len(factors) - 1
         for i in reversed(range(count)):
             joint = sum(row.kind != "fixed" for row in table.rows[:i])
             end = _row(factors, end, table.rows[i], table, joint)
-        factors.append(Factor(end, T=table.base))
+        factors.append(Factor(parent=end, T=table.base))
         at[label] = len(factors) - 1
     return _framed(table, factors, {name: (at[label], T) for name, (label, T) in frames.items()})
 
@@ -94,12 +94,12 @@ def _row(factors: list[Factor], parent: int, row: DHRow, table: DHTable, joint: 
     turn = tuple(unit) if row.kind == "revolute" else None
     slide = tuple(unit) if row.kind == "prismatic" else None
     about_z = [
-        Factor(0, True, "z", row.theta, turn, Parameter(row.name, "theta", "rad")),
-        Factor(0, False, "z", row.d, slide, Parameter(row.name, "d", "m")),
+        Factor(parent=0, turns=True, axis="z", value=row.theta, row=turn, parameter=Parameter(row.name, "theta", "rad")),
+        Factor(parent=0, turns=False, axis="z", value=row.d, row=slide, parameter=Parameter(row.name, "d", "m")),
     ]
     about_x = [
-        Factor(0, False, "x", row.a, None, Parameter(row.name, "a", "m")),
-        Factor(0, True, "x", row.alpha, None, Parameter(row.name, "alpha", "rad")),
+        Factor(parent=0, turns=False, axis="x", value=row.a, row=None, parameter=Parameter(row.name, "a", "m")),
+        Factor(parent=0, turns=True, axis="x", value=row.alpha, row=None, parameter=Parameter(row.name, "alpha", "rad")),
     ]
     return _chained(factors, parent, [*about_x[::-1], *about_z] if table.convention == "modified" else [*about_z, *about_x])
 
@@ -152,18 +152,35 @@ def of_urdf(
 def _joint(factors: list[Factor], parent: int, joint: UrdfJoint, joints: JointMap, n: int, reading: Reading, down: bool) -> int:
     """Append one joint's factors, backwards and inverted if it is passed from child to parent; returns the last one's index."""
     xyz = zip("xyz", joint.xyz, strict=True)
-    steps = [Factor(0, False, axis, x, None, Parameter(joint.name, f"origin {axis}", "m")) for axis, x in xyz]
+    steps = [
+        Factor(parent=0, turns=False, axis=axis, value=x, row=None, parameter=Parameter(joint.name, f"origin {axis}", "m"))
+        for axis, x in xyz
+    ]
     named = zip("zyx", ("yaw", "pitch", "roll"), reversed(joint.rpy), strict=True)
-    steps += [Factor(0, True, axis, x, None, Parameter(joint.name, name, "rad")) for axis, name, x in named]
+    steps += [
+        Factor(parent=0, turns=True, axis=axis, value=x, row=None, parameter=Parameter(joint.name, name, "rad"))
+        for axis, name, x in named
+    ]
     if reading.float32:
-        steps = [Factor(0, T=se3.from_xyz_rpy(joint.xyz, joint.rpy).astype(np.float32).astype(np.float64))]
+        steps = [Factor(parent=0, T=se3.from_xyz_rpy(joint.xyz, joint.rpy).astype(np.float32).astype(np.float64))]
     if joint.type in MOVABLE:
         steps += _motion(joint, joints, n, reading)
     for step in steps if down else reversed(steps):
         sign = 1.0 if down else -1.0
         row = None if step.row is None else tuple(sign * x for x in step.row)
         T = step.T if step.T is None or down else np.asarray(np.linalg.inv(step.T))
-        factors.append(Factor(parent, step.turns, step.axis, sign * step.value, row, step.parameter, sign, T))
+        factors.append(
+            Factor(
+                parent=parent,
+                turns=step.turns,
+                axis=step.axis,
+                value=sign * step.value,
+                row=row,
+                parameter=step.parameter,
+                sign=sign,
+                T=T,
+            )
+        )
         parent = len(factors) - 1
     return parent
 
@@ -179,9 +196,9 @@ def _motion(joint: UrdfJoint, joints: JointMap, n: int, reading: Reading) -> lis
     slides = joint.type == "prismatic"
     stretch = length if slides and reading.stretched else 1.0
     zero = Parameter(joint.name, "zero", "m" if slides else "rad")
-    motion = Factor(0, not slides, "z", stretch * value, tuple(stretch * row), zero)
+    motion = Factor(parent=0, turns=not slides, axis="z", value=stretch * value, row=tuple(stretch * row), parameter=zero)
     R = _onto(axis / length if length > 0 else np.array(Z_AXIS))
-    return [motion] if np.array_equal(R, np.eye(4)) else [Factor(0, T=R), motion, Factor(0, T=R.T)]
+    return [motion] if np.array_equal(R, np.eye(4)) else [Factor(parent=0, T=R), motion, Factor(parent=0, T=R.T)]
 
 
 def _onto(axis: Array) -> Array:

@@ -16,7 +16,7 @@ from harness.description.dh import DHRow
 STRAIGHT = 1e-6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Difference:
     """One number of two mechanisms: of a joint, or from one to the next; which; both values [m or rad]."""
 
@@ -59,7 +59,11 @@ def match(a: Sequence[DHRow], b: Sequence[DHRow]) -> Matching:
             options = []
             for previous, (cost, signs, normals, differences) in best.items():
                 normal, link = _link(a[i], b[i], previous != sign, f"{a[i].name} to {a[i + 1].name}")
-                found = link if i + 1 in free else (*link, Difference(a[i + 1].name, "d", "m", a[i + 1].d, sign * b[i + 1].d))
+                found = (
+                    link
+                    if i + 1 in free
+                    else (*link, Difference(joint=a[i + 1].name, name="d", unit="m", a=a[i + 1].d, b=sign * b[i + 1].d))
+                )
                 worst = max(cost[0], *(d.size for d in found))
                 total = (worst, cost[1] + sum(d.size for d in found), cost[2] + (sign < 0))
                 options.append((_rounded(total), (*signs, sign), (*normals, normal), (*differences, *found)))
@@ -80,8 +84,8 @@ def _link(a: DHRow, b: DHRow, turned: bool, between: str) -> tuple[int, tuple[Di
     options = []
     for normal in (1, -1):
         found = (
-            Difference(between, "a", "m", a.a, normal * b.a),
-            Difference(between, "alpha", "rad", a.alpha, _near(normal * twist, a.alpha)),
+            Difference(joint=between, name="a", unit="m", a=a.a, b=normal * b.a),
+            Difference(joint=between, name="alpha", unit="rad", a=a.alpha, b=_near(normal * twist, a.alpha)),
         )
         options.append((round(max(d.size for d in found), 9), -normal, normal, found))
     _, _, normal, found = min(options, key=lambda option: option[:2])

@@ -32,7 +32,7 @@ class Parameter(NamedTuple):
     unit: Literal["m", "rad"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Factor:
     """A turn (`turns`) about, or a move along, an axis by value + row . q; or a constant transform T (4, 4).
 
@@ -134,7 +134,7 @@ class Mechanism:
         """The named frames with a constant transform (4, 4) behind them."""
         factors, frames = list(self.factors), dict(self.frames)
         for name, Y in offsets.items():
-            factors.append(Factor(frames[name], T=Y))
+            factors.append(Factor(parent=frames[name], T=Y))
             frames[name] = len(factors) - 1
         return replace(self, factors=tuple(factors), frames=frames)
 

@@ -39,7 +39,7 @@ class TableRecipe:
         return asked(of_table(self.table, self.frames, self.backwards), self.P)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class UrdfRecipe:
     """A URDF seen from link `base`; frames: for each compared frame its link; joints: the map from the model's joints."""
 

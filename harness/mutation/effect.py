@@ -19,7 +19,7 @@ from harness.se3 import Array
 SAMPLES = 200
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Effect:
     """Of one mutant on one source, at each mapped frame (F,): discrepancy and its distance from the original's, [m], [rad]."""
 
@@ -40,11 +40,11 @@ def effect_of(mutant: Mutant, original: RobotModel, source: str) -> Effect:
     D_was, D_now = was[0] - was[1], now[0] - now[1]
     change = D_now - D_was
     return Effect(
-        names,
-        np.linalg.norm(D_now[..., :3, 3], axis=-1).max(axis=0),
-        np.linalg.norm(D_now[..., :3, :3], axis=(-2, -1)).max(axis=0) / np.sqrt(2.0),
-        np.linalg.norm(change[..., :3, 3], axis=-1).max(axis=0),
-        np.linalg.norm(change[..., :3, :3], axis=(-2, -1)).max(axis=0) / np.sqrt(2.0),
+        frames=names,
+        position=np.linalg.norm(D_now[..., :3, 3], axis=-1).max(axis=0),
+        rotation=np.linalg.norm(D_now[..., :3, :3], axis=(-2, -1)).max(axis=0) / np.sqrt(2.0),
+        position_change=np.linalg.norm(change[..., :3, 3], axis=-1).max(axis=0),
+        rotation_change=np.linalg.norm(change[..., :3, :3], axis=(-2, -1)).max(axis=0) / np.sqrt(2.0),
     )
 
 
@@ -62,9 +62,15 @@ def _pair(model: RobotModel, source: str, q: Array, names: tuple[str, ...], faul
     prismatic = tuple(model.table.kind(j) == "prismatic" for j in model.table.joints)
     links = {n: f.urdf or "" for n, f in frames.items()}
     base, reading = model.frames.base.urdf or "", _reading(source, fault)
-    T_b = UrdfRecipe(model.urdf, base, links, model.urdf_joints, model.table.joints, prismatic, reading).mechanism.placements(
-        q, names
-    )
+    T_b = UrdfRecipe(
+        urdf=model.urdf,
+        base=base,
+        frames=links,
+        joints=model.urdf_joints,
+        model_joints=model.table.joints,
+        prismatic=prismatic,
+        reading=reading,
+    ).mechanism.placements(q, names)
     rigid = [i for i, n in enumerate(names) if frames[n].offset is None]
     if rigid:
         T_a[:, rigid] = T_a[:, rigid] @ fit.behind(T_a[:, rigid], T_b[:, rigid])

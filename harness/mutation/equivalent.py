@@ -26,7 +26,7 @@ def equivalents(model: RobotModel) -> Iterator[Mutant]:
     for i, row in enumerate(rows):
         if row.kind == "revolute":
             turned = with_row(model, i, theta=row.theta + 2.0 * math.pi)
-            yield Mutant(f"theta of {row.name} + 2 pi", "table", "theta + 2 pi", turned)
+            yield Mutant(name=f"theta of {row.name} + 2 pi", side="table", operator="theta + 2 pi", model=turned)
     yield from _slides(model)
     yield _base_into_d1(model)
     if model.table.convention == "standard":
@@ -45,7 +45,7 @@ def _slides(model: RobotModel) -> Iterator[Mutant]:
             back = se3.translation((0.0, 0.0, -SLIDE))
             frames = [offset_by(f, back) if f.dh == str(i + 1) else f for f in model.frames.frames]
             name = f"d of {one.name} and {other.name} slid along their parallel axes"
-            yield Mutant(name, "table", "slide", with_frames(with_rows(model, slid), frames))
+            yield Mutant(name=name, side="table", operator="slide", model=with_frames(with_rows(model, slid), frames))
 
 
 def _base_into_d1(model: RobotModel) -> Mutant:
@@ -54,7 +54,7 @@ def _base_into_d1(model: RobotModel) -> Mutant:
     rows[0] = replace(rows[0], d=rows[0].d - SLIDE)
     frames = [_lowered(f.dh, f, table.base) for f in model.frames.frames]
     moved = with_rows(model, rows, base=table.base @ se3.translation((0.0, 0.0, SLIDE)))
-    return Mutant("base moved into d1", "table", "base into d1", with_frames(moved, frames))
+    return Mutant(name="base moved into d1", side="table", operator="base into d1", model=with_frames(moved, frames))
 
 
 def _lowered(label: str, frame: MappedFrame, base: Array) -> MappedFrame:
@@ -76,7 +76,9 @@ def _as_modified(model: RobotModel) -> Mutant:
     tool = behind[last] @ table.tool
     frames = [offset_by(f, behind[f.dh]) if f.dh in behind else f for f in model.frames.frames]
     modified = with_rows(model, rows, convention="modified", tool=tool)
-    return Mutant("standard rewritten as modified", "table", "as modified", with_frames(modified, frames))
+    return Mutant(
+        name="standard rewritten as modified", side="table", operator="as modified", model=with_frames(modified, frames)
+    )
 
 
 def with_follower(model: RobotModel) -> Iterator[Mutant]:
@@ -116,9 +118,18 @@ def with_follower(model: RobotModel) -> Iterator[Mutant]:
     b = np.append(joints.b, 2.0 * joints.b[row])
     b[row] *= -1.0
     order = [names.index(name) for name in (split.urdf.movable if split.urdf else names)]
-    joint_map = JointMap(tuple(names[i] for i in order), A[order], b[order], (*joints.followers, follower), joints.held)
+    joint_map = JointMap(
+        names=tuple(names[i] for i in order), A=A[order], b=b[order], followers=(*joints.followers, follower), held=joints.held
+    )
     split = replace(split, urdf_joints=joint_map)
-    yield Mutant(f"{joint.name} split into a leader and a follower", "urdf", "mimic", split)
+    yield Mutant(name=f"{joint.name} split into a leader and a follower", side="urdf", operator="mimic", model=split)
     own = model.table.joints[int(np.flatnonzero(joints.A[row])[0])]
     causes = (Cause("mimic", follower), Cause("sign", own))
-    yield Mutant(f"follower of {joint.name} ignored", "controller", "mimic ignored", split, causes, "mimic ignored")
+    yield Mutant(
+        name=f"follower of {joint.name} ignored",
+        side="controller",
+        operator="mimic ignored",
+        model=split,
+        causes=causes,
+        fault="mimic ignored",
+    )

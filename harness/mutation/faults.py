@@ -30,7 +30,11 @@ def of_joints(model: RobotModel) -> Iterator[Mutant]:
             for size, text in OFFSETS:
                 cause = Cause("parameter", row.name, "theta", -size)
                 yield Mutant(
-                    f"{row.name} offset by {text}", "table", "offset", with_row(model, i, theta=row.theta + size), (cause,)
+                    name=f"{row.name} offset by {text}",
+                    side="table",
+                    operator="offset",
+                    model=with_row(model, i, theta=row.theta + size),
+                    causes=(cause,),
                 )
         yield from _of_map(model, n)
     for i, j in pairwise(moving):
@@ -40,7 +44,11 @@ def of_joints(model: RobotModel) -> Iterator[Mutant]:
             rows[i], rows[j] = replace(one, name=other.name), replace(other, name=one.name)
             swapped = _reordered(with_rows(model, rows), model)
             yield Mutant(
-                f"{one.name} and {other.name} exchanged", "table", "order", swapped, (Cause("order", one.name, other.name),)
+                name=f"{one.name} and {other.name} exchanged",
+                side="table",
+                operator="order",
+                model=swapped,
+                causes=(Cause("order", one.name, other.name),),
             )
 
 
@@ -62,7 +70,11 @@ def _of_map(model: RobotModel, n: int) -> Iterator[Mutant]:
     A[row] *= -1.0
     cause = Cause("sign", name)
     yield Mutant(
-        f"{name} sign in the mapping", "mapping", "joint sign", replace(model, urdf_joints=replace(joints, A=A)), (cause,)
+        name=f"{name} sign in the mapping",
+        side="mapping",
+        operator="joint sign",
+        model=replace(model, urdf_joints=replace(joints, A=A)),
+        causes=(cause,),
     )
     if model.table.kind(name) != "revolute":
         return
@@ -71,12 +83,20 @@ def _of_map(model: RobotModel, n: int) -> Iterator[Mutant]:
         b[row] += size
         cause = Cause("parameter", joints.names[row], "zero", -size)
         mutated = replace(model, urdf_joints=replace(joints, b=b))
-        yield Mutant(f"{name} offset by {text} in the mapping", "mapping", "offset", mutated, (cause,))
+        yield Mutant(
+            name=f"{name} offset by {text} in the mapping", side="mapping", operator="offset", model=mutated, causes=(cause,)
+        )
     if n > 0 and model.table.kind(own[n - 1]) == "revolute":
         A = joints.A.copy()
         A[row, n - 1] += A[row, n]
         mutated = replace(model, urdf_joints=replace(joints, A=A))
-        yield Mutant(f"{name} coupled to {own[n - 1]}", "mapping", "coupling", mutated, (Cause("coupling", name, own[n - 1]),))
+        yield Mutant(
+            name=f"{name} coupled to {own[n - 1]}",
+            side="mapping",
+            operator="coupling",
+            model=mutated,
+            causes=(Cause("coupling", name, own[n - 1]),),
+        )
 
 
 def of_whole(model: RobotModel) -> Iterator[Mutant]:
@@ -84,11 +104,11 @@ def of_whole(model: RobotModel) -> Iterator[Mutant]:
     table = model.table
     other = "modified" if table.convention == "standard" else "standard"
     yield Mutant(
-        "rows read as the other convention",
-        "table",
-        "convention",
-        with_rows(model, table.rows, convention=other),
-        (Cause("convention"),),
+        name="rows read as the other convention",
+        side="table",
+        operator="convention",
+        model=with_rows(model, table.rows, convention=other),
+        causes=(Cause("convention"),),
     )
 
     def lengths(r: DHRow) -> DHRow:
@@ -99,11 +119,11 @@ def of_whole(model: RobotModel) -> Iterator[Mutant]:
         M[:3, 3] *= 1e3
     cause = (Cause("millimetres"),)
     yield Mutant(
-        "table in millimetres",
-        "table",
-        "millimetres",
-        with_rows(model, [lengths(r) for r in table.rows], base=T[0], tool=T[1]),
-        cause,
+        name="table in millimetres",
+        side="table",
+        operator="millimetres",
+        model=with_rows(model, [lengths(r) for r in table.rows], base=T[0], tool=T[1]),
+        causes=cause,
     )
     yield _rows(model, "table in degrees", "degrees", lambda x, angle: math.degrees(x) if angle else x, Cause("degrees"))
     yield _rows(model, "table as float32", "float32", lambda x, angle: float(np.float32(x)), Cause("float32"))
@@ -129,7 +149,7 @@ def _rows(model: RobotModel, name: str, operator: str, edit: object, cause: Caus
     rows = [
         replace(r, a=f(r.a, False), d=f(r.d, False), alpha=f(r.alpha, True), theta=f(r.theta, True)) for r in model.table.rows
     ]
-    return Mutant(name, "table", operator, with_rows(model, rows), (cause,))
+    return Mutant(name=name, side="table", operator=operator, model=with_rows(model, rows), causes=(cause,))
 
 
 def _origins(model: RobotModel, name: str, operator: str, edit: object, cause: Cause) -> Mutant:
@@ -140,7 +160,7 @@ def _origins(model: RobotModel, name: str, operator: str, edit: object, cause: C
         for attribute, angle in (("xyz", False), ("rpy", True)):
             if text := origin.get(attribute):
                 origin.set(attribute, " ".join(repr(edit(float(word), angle)) for word in text.split()))
-    return Mutant(name, "urdf", operator, with_urdf(model, robot), (cause,))
+    return Mutant(name=name, side="urdf", operator=operator, model=with_urdf(model, robot), causes=(cause,))
 
 
 def of_tool(model: RobotModel) -> Iterator[Mutant]:
@@ -148,15 +168,33 @@ def of_tool(model: RobotModel) -> Iterator[Mutant]:
     table, last = model.table, model.table.rows[-1]
     if not np.array_equal(table.tool, np.eye(4)):
         missing = with_rows(model, table.rows, tool=np.eye(4))
-        yield Mutant("tool missing", "table", "tool missing", missing, (Cause("tool left out"), *_alone(table.tool)))
+        yield Mutant(
+            name="tool missing",
+            side="table",
+            operator="tool missing",
+            model=missing,
+            causes=(Cause("tool left out"), *_alone(table.tool)),
+        )
     elif last.kind == "fixed" and last.d:
         mutated = with_row(model, len(table.rows) - 1, d=0.0)
-        yield Mutant("tool missing", "table", "tool missing", mutated, (Cause("parameter", last.name, "d", last.d),))
+        yield Mutant(
+            name="tool missing",
+            side="table",
+            operator="tool missing",
+            model=mutated,
+            causes=(Cause("parameter", last.name, "d", last.d),),
+        )
     else:
         label = str(len(table.rows))
         frames = [replace(f, dh="tool") if f.dh == label else f for f in model.frames.frames]
         longer = with_frames(with_rows(model, table.rows, tool=se3.translation((0.0, 0.0, 0.15))), frames)
-        yield Mutant("a tool of 150 mm on one side", "table", "tool missing", longer, (Cause("tool left out"),))
+        yield Mutant(
+            name="a tool of 150 mm on one side",
+            side="table",
+            operator="tool missing",
+            model=longer,
+            causes=(Cause("tool left out"),),
+        )
 
 
 def _alone(tool: Array) -> list[Cause]:
@@ -175,4 +213,4 @@ def of_controllers(model: RobotModel) -> Iterator[Mutant]:
         ("reversed", Cause("reversed")),
     )
     for fault, cause in faults:
-        yield Mutant(f"controller: {fault}", "controller", fault, model, (cause,), fault)
+        yield Mutant(name=f"controller: {fault}", side="controller", operator=fault, model=model, causes=(cause,), fault=fault)

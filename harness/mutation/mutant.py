@@ -40,7 +40,7 @@ class Cause:
         return abs(off) <= WITHIN * abs(self.size)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Mutant:
     """One fault. side: where it was put; operator: its kind in the score; causes: any of them is right; none for an equivalent
     mutant, which must not be flagged. fault: what a controller does wrong, run as a program of its own on the model.

@@ -39,7 +39,7 @@ def of_table(model: RobotModel) -> Iterator[Mutant]:
             for operator, text, change in changes_of(value, unit):
                 mutated = with_row(model, i, **{name: value + change})
                 cause = Cause("parameter", row.name, name, -change)
-                yield Mutant(f"{name} of {row.name} {text}", "table", operator, mutated, (cause,))
+                yield Mutant(name=f"{name} of {row.name} {text}", side="table", operator=operator, model=mutated, causes=(cause,))
 
 
 def of_urdf(model: RobotModel) -> Iterator[Mutant]:
@@ -57,7 +57,13 @@ def of_urdf(model: RobotModel) -> Iterator[Mutant]:
                 values = [v + change if i == k else v for i, v in enumerate(getattr(joint, attribute))]
                 mutated = with_origin(model, joint.name, attribute, values)
                 cause = Cause("parameter", joint.name, parameter.name, -change)
-                yield Mutant(f"{parameter.name} of {joint.name} {text}", "urdf", operator, mutated, (cause,))
+                yield Mutant(
+                    name=f"{parameter.name} of {joint.name} {text}",
+                    side="urdf",
+                    operator=operator,
+                    model=mutated,
+                    causes=(cause,),
+                )
 
 
 def with_origin(model: RobotModel, joint: str, attribute: str, values: list[float]) -> RobotModel:

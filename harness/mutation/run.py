@@ -46,7 +46,9 @@ def _known(folder: Path, source: str) -> list[Change]:
     model = _prepared(folder)[0]
     if not model.file.accepted:
         return []
-    report = crosscheck(model, Options(SAMPLES, 0, (source,), certify=False, in_process=True), None, _workers())
+    report = crosscheck(
+        model, Options(samples=SAMPLES, seed=0, sources=(source,), certify=False, in_process=True), None, _workers()
+    )
     found = report.sources[-1].explanation
     return found.changes if found else []
 

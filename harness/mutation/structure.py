@@ -33,14 +33,33 @@ def of_axes(model: RobotModel) -> Iterator[Mutant]:
                 etree.SubElement(element, "axis", xyz=" ".join(repr(v) for v in values))
 
         left_out = with_joint(model, joint.name, lambda e: write(e, None))
-        yield Mutant(f"axis of {joint.name} left out", "urdf", "axis left out", left_out, (Cause("axis", joint.name, letter),))
+        yield Mutant(
+            name=f"axis of {joint.name} left out",
+            side="urdf",
+            operator="axis left out",
+            model=left_out,
+            causes=(Cause("axis", joint.name, letter),),
+        )
         negated = with_joint(model, joint.name, lambda e, a=axis: write(e, tuple(-x for x in a)))
-        yield Mutant(f"axis of {joint.name} negated", "urdf", "joint sign", negated, (Cause("sign", _model_joint(model, joint)),))
+        yield Mutant(
+            name=f"axis of {joint.name} negated",
+            side="urdf",
+            operator="joint sign",
+            model=negated,
+            causes=(Cause("sign", _model_joint(model, joint)),),
+        )
         doubled = with_joint(model, joint.name, lambda e, a=axis: write(e, tuple(2.0 * x for x in a)))
         scaled = joint.type == "prismatic"
         extra = ("urdf:yourdfpy",) if scaled else ()
         causes = (Cause("axis length"),) if scaled else ()
-        yield Mutant(f"axis of {joint.name} of length 2", "urdf", "axis unnormalised", doubled, causes, extra=extra)
+        yield Mutant(
+            name=f"axis of {joint.name} of length 2",
+            side="urdf",
+            operator="axis unnormalised",
+            model=doubled,
+            causes=causes,
+            extra=extra,
+        )
 
 
 def _model_joint(model: RobotModel, joint: UrdfJoint) -> str:
@@ -63,7 +82,9 @@ def of_frames(model: RobotModel) -> Iterator[Mutant]:
         same = one.offset is not None and other.offset is not None and np.allclose(one.offset, other.offset)
         operator = "base/base_link" if at_base else "flange/tool0"
         name = f"{one.name} and {other.name}: links exchanged"
-        yield Mutant(name, "mapping", operator, with_frames(model, swapped), () if same else (cause,))
+        yield Mutant(
+            name=name, side="mapping", operator=operator, model=with_frames(model, swapped), causes=() if same else (cause,)
+        )
 
 
 def _neighbours(model: RobotModel) -> Iterator[tuple[MappedFrame, MappedFrame]]:

@@ -40,7 +40,9 @@ def try_out(
     workers.model = mutant.model
     commands = ((named[0], (str(mutant.fault),)),) if mutant.fault else ()
     chosen = () if mutant.fault else named
-    options = Options(SAMPLES, 0, chosen, workers=commands, certify=bool(original.file.accepted), in_process=True)
+    options = Options(
+        samples=SAMPLES, seed=0, sources=chosen, workers=commands, certify=bool(original.file.accepted), in_process=True
+    )
     model = mutant.model
     if mutant.fault:  # the program alone
         model = replace(model, file=model.file.model_copy(update={"source": []}))

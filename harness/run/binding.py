@@ -30,7 +30,7 @@ class Measured(NamedTuple):
     spread: float
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Bound:
     """An engine bound to a model: asked in the model's joint order, answering at the mapped frames.
 
@@ -116,7 +116,16 @@ def bind(engine: Engine, model: RobotModel, offsets: Mapping[str, Array]) -> Bou
         base = read.index(str(labels[anchor.name]))
         view = View(slots, constant, base, None if np.array_equal(T, np.eye(4)) else T)
         read_in = "" if anchor is model.frames.base else anchor.name
-    return Bound(engine, joint_map, tuple(read), view, missing, tuple(absent), tuple(undeclared), read_in)
+    return Bound(
+        engine=engine,
+        joint_map=joint_map,
+        frames=tuple(read),
+        view=view,
+        missing=missing,
+        absent=tuple(absent),
+        undeclared=tuple(undeclared),
+        read_in=read_in,
+    )
 
 
 def _label(frame: MappedFrame, kind: str, names: EngineNames) -> str | None:

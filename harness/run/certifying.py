@@ -99,7 +99,15 @@ def _by_grid(results: Results, reference: Participant, axes: list[Axis]) -> Cert
 
     def one(participant: Participant) -> Certified:
         own, common = sampled(participant), _Common.of(participant.running(), reference.running())
-        known = Certified("", "grid", len(nodes), own.residual, base.residual, own.limit, common.frames)
+        known = Certified(
+            reason="",
+            form="grid",
+            nodes=len(nodes),
+            residual=own.residual,
+            reference_residual=base.residual,
+            limit=own.limit,
+            frames=common.frames,
+        )
         if reason := _refusal(own, base, participant.name, reference.name):
             return replace(known, reason=reason)
         a, b = replace(own, values=own.values[:, common.rows_a]), replace(base, values=base.values[:, common.rows_b])
@@ -123,7 +131,15 @@ def _by_links(results: Results, reference: Participant, axes: list[Axis]) -> Cer
         common = _Common.of(participant.running(), reference.running())
         own, base, bounds = _link_bounds(results, participant, reference, axes, common)
         count = sum(len(value) for value in own.values)
-        known = Certified("", "links", count, own.residual, base.residual, own.limit, common.frames)
+        known = Certified(
+            reason="",
+            form="links",
+            nodes=count,
+            residual=own.residual,
+            reference_residual=base.residual,
+            limit=own.limit,
+            frames=common.frames,
+        )
         if reason := _refusal(own, base, participant.name, reference.name):
             return replace(known, reason=reason)
         starts = np.concatenate(_starts(results, participant.name))

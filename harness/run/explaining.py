@@ -56,7 +56,17 @@ def problem_of(
     # Two descriptions that are read as they should be differ themselves; else it is the engine that does.
     sources = [label if recipe else name for label, recipe, name in zip(labels, recipes, engines, strict=True)]
     return Problem(
-        recipes[0], recipes[1], names, rigid, *parts, tolerance, behind, (labels[0], labels[1]), (sources[0], sources[1]), engines
+        a=recipes[0],
+        b=recipes[1],
+        names=names,
+        rigid=rigid,
+        seen=parts[0],
+        check=parts[1],
+        tolerance=tolerance,
+        behind=behind,
+        labels=(labels[0], labels[1]),
+        sources=(sources[0], sources[1]),
+        engines=engines,
     )
 
 
@@ -78,7 +88,14 @@ def recipes_of(model: RobotModel, kind: str, names: tuple[str, ...], offsets: Ma
         return
     prismatic = tuple(model.table.kind(j) == "prismatic" for j in model.table.joints)
     links = {n: f.urdf or "" for n, f in frames.items()}
-    plain = UrdfRecipe(model.urdf, model.frames.base.urdf or "", links, model.urdf_joints, model.table.joints, prismatic)
+    plain = UrdfRecipe(
+        urdf=model.urdf,
+        base=model.frames.base.urdf or "",
+        frames=links,
+        joints=model.urdf_joints,
+        model_joints=model.table.joints,
+        prismatic=prismatic,
+    )
     codes = {finding.code for finding in model.findings}
     for axis in (X_AXIS, Z_AXIS) if "missing-axis" in codes else (X_AXIS,):
         for stretched in (False, True) if "unnormalised-axis" in codes else (False,):

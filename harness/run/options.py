@@ -10,7 +10,7 @@ from harness.workers.pool import Workers
 from harness.workers.process import Limits
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Options:
     """What a cross-check is asked to do. `sources` empty: those of model.toml. `command` is shown as how to reproduce.
 

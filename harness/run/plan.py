@@ -19,7 +19,7 @@ from harness.run.options import Options
 Status: TypeAlias = Literal["ran", "not run", "failed"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Planned:
     """A source that is to run: an engine, or a command of the user's that speaks the worker protocol, run in `folder`."""
 
@@ -30,7 +30,7 @@ class Planned:
     folder: Path | None = None
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Participant:
     """A planned source and what became of it. `bound` is None unless it runs."""
 
@@ -81,7 +81,7 @@ def plan(model: RobotModel, options: Options) -> list[Planned]:
         if entry is None and name not in commands:
             tolerance = _no_finer_than(tolerance, name)
         folder = None if name in dict(options.workers) else model.folder
-        planned.append(Planned(name, required, tolerance, commands.get(name, ()), folder))
+        planned.append(Planned(name=name, required=required, tolerance=tolerance, command=commands.get(name, ()), folder=folder))
     if len(planned) < 2:
         raise InputError(
             f"{model.name}: nothing to compare with the reference {options.reference}",

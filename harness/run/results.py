@@ -15,7 +15,7 @@ from harness.run.plan import Participant
 from harness.se3 import Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Reproduced:
     """The shrunk worst configuration of a source: mapped frame, q (n,), errors [m], [rad], both placements (4, 4)."""
 
@@ -27,7 +27,7 @@ class Reproduced:
     T_source: Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Certified:
     """A source's certificate against the reference, or why it has none (`reason`).
 
@@ -64,7 +64,7 @@ class Posed:
     placements: dict[int, tuple[Array, Array]]
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Results:
     """Everything a run found. `comparison` is None if the reference did not run; `in_house` is always there."""
 

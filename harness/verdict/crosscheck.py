@@ -40,8 +40,8 @@ def crosscheck(model: RobotModel, options: Options, progress: Progress | None = 
     or failing engine is part of the report.
     """
     started = time.perf_counter()
-    participants = [Participant(planned) for planned in plan(model, options)]
-    results = Results(model, options, participants)
+    participants = [Participant(planned=planned) for planned in plan(model, options)]
+    results = Results(model=model, options=options, participants=participants)
     with contextlib.ExitStack() as stack:
         workers = workers or stack.enter_context(options.workshop())
         bind_all(results, workers)
@@ -174,4 +174,5 @@ def _shrunk(reference: Bound, source: Bound, frame: int, q: Array, tolerance: tu
 
     q = shrink(q, disagrees)
     position, rotation = errors(q)
-    return Reproduced(frame, q, position, rotation, *placements(q))
+    T_reference, T_source = placements(q)
+    return Reproduced(frame=frame, q=q, position=position, rotation=rotation, T_reference=T_reference, T_source=T_source)

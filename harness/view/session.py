@@ -23,7 +23,7 @@ from harness.verdict.crosscheck import bind_all
 from harness.workers.pool import Workers
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Apart:
     """One source at one frame, off the reference [m], [rad]; within: no more than the tolerance."""
 
@@ -52,7 +52,9 @@ class Session:
         Raises InputError for wrong options, EngineFailed if the reference does not run.
         """
         self.model, self.options = model, options
-        self.results = Results(model, options, [Participant(planned) for planned in plan(model, options)])
+        self.results = Results(
+            model=model, options=options, participants=[Participant(planned=planned) for planned in plan(model, options)]
+        )
         self._lock = threading.Lock()
         bind_all(self.results, workers)
         self.results.comparison = compare(self.results, workers, None)
@@ -110,7 +112,7 @@ class Session:
                     continue
                 errors = (float(position_error(T_a, T_b)), float(rotation_error(T_a, T_b)))
                 within = all(e <= limit for e, limit in zip(errors, limits, strict=True))
-                rows.append(Apart(participant.name, frame, *errors, within))
+                rows.append(Apart(source=participant.name, frame=frame, position=errors[0], rotation=errors[1], within=within))
         return rows
 
     @cached_property

@@ -46,7 +46,7 @@ ONE_JOINT = UrdfText(
     "<child link='tip'/><origin xyz='0.5 0 0.25' rpy='0 0 0'/><axis xyz='0 0 1'/>"
     "<limit lower='-3' upper='3' effort='1' velocity='1'/></joint></robot>"
 )
-ONE_ROW = DHTable((DHRow("j", "revolute", 0.5, 0.0, 0.25, 0.0),))
+ONE_ROW = DHTable((DHRow(name="j", kind="revolute", a=0.5, alpha=0.0, d=0.25, theta=0.0),))
 
 
 def install(adapters: Sequence[type[Engine]], constraints: Path | None, say: Say) -> dict[str, Installed]:

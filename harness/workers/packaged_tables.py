@@ -50,8 +50,8 @@ def packaged_table(name: str) -> DHTable:
 def _table(data: dict[str, Any]) -> DHTable:
     rows = tuple(
         DHRow(
-            f"joint{i}", "prismatic" if row["slides"] else "revolute", row["a"], row["alpha"],
-            row["offset"] if row["slides"] else row["d"], row["theta"] if row["slides"] else row["offset"],
+            name=f"joint{i}", kind="prismatic" if row["slides"] else "revolute", a=row["a"], alpha=row["alpha"],
+            d=row["offset"] if row["slides"] else row["d"], theta=row["theta"] if row["slides"] else row["offset"],
         )
         for i, row in enumerate(data["rows"], start=1)
     )  # fmt: skip

@@ -57,7 +57,10 @@ def decode(message: dict[str, Any]) -> Description:
     """The description of a greeting. Raises KeyError or ValueError for one that this version does not know."""
     kind = message["kind"]
     if kind == "dh":
-        rows = tuple(DHRow(r["joint"], r["type"], r["a"], r["alpha"], r["d"], r["theta"]) for r in message["rows"])
+        rows = tuple(
+            DHRow(name=r["joint"], kind=r["type"], a=r["a"], alpha=r["alpha"], d=r["d"], theta=r["theta"])
+            for r in message["rows"]
+        )
         return DHTable(rows, message["convention"], np.array(message["base"]), np.array(message["tool"]))
     if kind == "packaged":
         return Packaged(message["robot"], tuple(message["joints"]))

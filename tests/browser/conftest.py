@@ -85,7 +85,7 @@ def documents(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Report]:
     found = {}
     for name, edit in edits.items():
         model = load_model(copied(folder, name, *([edit] if edit else [])))
-        found[name] = crosscheck(model, Options(200, 0, SOURCES, command=f"crosscheck run {name}"))
+        found[name] = crosscheck(model, Options(samples=200, seed=0, sources=SOURCES, command=f"crosscheck run {name}"))
     found["stanford"] = compared(found["stanford"], accepted_from(found["stanford"]), True)
     return found
 

@@ -35,7 +35,7 @@ PINOCCHIO = "urdf:pinocchio"
 
 def why(model: RobotModel, engine: Engine | None = None) -> tuple[reasons.Explanation, doc.Source]:
     """The explanation of a run against Pinocchio's URDF."""
-    report = crosscheck(model, Options(200, 0, (PINOCCHIO,), certify=False))
+    report = crosscheck(model, Options(samples=200, seed=0, sources=(PINOCCHIO,), certify=False))
     source = report.sources[-1]
     assert source.explanation is not None
     return source.explanation, source
@@ -175,7 +175,9 @@ def test_two_numbers_are_both_named(models: dict[str, RobotModel], changes: tupl
 
 
 def test_the_cause_is_in_every_format_and_in_the_verdict(models: dict[str, RobotModel]) -> None:
-    report = crosscheck(with_row(models["ur5"], 0, d=0.08946), Options(50, 0, (PINOCCHIO, "dh:pinocchio"), certify=False))
+    report = crosscheck(
+        with_row(models["ur5"], 0, d=0.08946), Options(samples=50, seed=0, sources=(PINOCCHIO, "dh:pinocchio"), certify=False)
+    )
     text = "d of shoulder_pan_joint: 0.08946 m in dh.csv"
     assert f"because {text}" in report.verdict.sentence
     assert text in render_html(report)
@@ -184,7 +186,9 @@ def test_the_cause_is_in_every_format_and_in_the_verdict(models: dict[str, Robot
 
 
 def test_no_explain_leaves_it_out(models: dict[str, RobotModel]) -> None:
-    report = crosscheck(with_row(models["ur5"], 0, d=0.08946), Options(50, 0, (PINOCCHIO,), certify=False, explain=False))
+    report = crosscheck(
+        with_row(models["ur5"], 0, d=0.08946), Options(samples=50, seed=0, sources=(PINOCCHIO,), certify=False, explain=False)
+    )
     assert report.sources[-1].explanation is None
     assert "because" not in report.verdict.sentence
 
@@ -197,10 +201,10 @@ OTHER_CAUSE: Edit = ("model.toml", '"origin x" = -0.00043624 }', '"origin x" = -
 def test_an_accepted_deviation_of_another_cause_has_changed(copy_model: Callable[..., Path], edit: Edit) -> None:
     """By its size alone, 0.436 mm within 2 %, it would pass."""
     model = load_model(copy_model("iiwa14", edit))
-    report = crosscheck(model, Options(2000, 0, (PINOCCHIO,)))
+    report = crosscheck(model, Options(samples=2000, seed=0, sources=(PINOCCHIO,)))
     assert report.verdict.exit_code == 1
     assert "deviation changed" in report.verdict.sentence
-    assert crosscheck(model, Options(2000, 0, (PINOCCHIO,), explain=False)).verdict.exit_code == 0
+    assert crosscheck(model, Options(samples=2000, seed=0, sources=(PINOCCHIO,), explain=False)).verdict.exit_code == 0
 
 
 def test_a_repair_is_really_applied(models: dict[str, RobotModel]) -> None:

@@ -69,7 +69,7 @@ def test_the_lebesgue_constant_is_five_thirds_and_attained() -> None:
 def random_table(rng: np.random.Generator, joints: int) -> DHTable:
     kinds = np.where(rng.random(joints) < 0.25, "prismatic", "revolute")
     rows = tuple(
-        DHRow(f"j{i}", str(kind), *(float(x) for x in rng.normal(size=4) * [0.4, 1.5, 0.4, 1.5]))  # type: ignore[arg-type]
+        DHRow.of(f"j{i}", str(kind), rng.normal(size=4) * [0.4, 1.5, 0.4, 1.5])  # type: ignore[arg-type]
         for i, kind in enumerate(kinds)
     )
     return DHTable(rows, "standard" if rng.random() < 0.5 else "modified")
@@ -78,7 +78,7 @@ def random_table(rng: np.random.Generator, joints: int) -> DHTable:
 def perturbed(table: DHTable, rng: np.random.Generator, size: float) -> DHTable:
     change = rng.normal(size=(len(table.rows), 4)) * (rng.random((len(table.rows), 4)) < 0.3) * size
     rows = tuple(
-        DHRow(r.name, r.kind, r.a + c[0], r.alpha + c[1], r.d + c[2], r.theta + c[3])
+        DHRow(name=r.name, kind=r.kind, a=r.a + c[0], alpha=r.alpha + c[1], d=r.d + c[2], theta=r.theta + c[3])
         for r, c in zip(table.rows, change, strict=True)
     )
     return DHTable(rows, table.convention)
@@ -131,10 +131,10 @@ def test_no_bound_lies_below_what_is_seen(seed: int, joints: int, size: float) -
 
 def test_climbing_finds_the_top() -> None:
     """One joint, one lever: |D| is largest where the analysis says, not at a node."""
-    a = DHTable((DHRow("j", "revolute", 1.0, 0.0, 0.0, 0.0),))
-    b = DHTable((DHRow("j", "revolute", 1.0, 0.0, 0.0, 0.0),), base=np.eye(4))
+    a = DHTable((DHRow(name="j", kind="revolute", a=1.0, alpha=0.0, d=0.0, theta=0.0),))
+    b = DHTable((DHRow(name="j", kind="revolute", a=1.0, alpha=0.0, d=0.0, theta=0.0),), base=np.eye(4))
     shifted = DHTable(b.rows, base=np.array([[1, 0, 0, 0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]]))
-    stretched = DHTable((DHRow("j", "revolute", 1.2, 0.0, 0.0, 0.0),), base=shifted.base)
+    stretched = DHTable((DHRow(name="j", kind="revolute", a=1.2, alpha=0.0, d=0.0, theta=0.0),), base=shifted.base)
 
     def difference(q: Array) -> Array:
         return np.asarray(evaluate(stretched)(q) - evaluate(a)(q))
@@ -145,9 +145,14 @@ def test_climbing_finds_the_top() -> None:
 
 def test_a_chain_of_thirty_joints(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
-    table = DHTable(tuple(DHRow(f"j{i}", "revolute", 0.1, math.pi / 2 * (-1) ** i, 0.05, 0.0) for i in range(30)))
+    table = DHTable(
+        tuple(DHRow(name=f"j{i}", kind="revolute", a=0.1, alpha=math.pi / 2 * (-1) ** i, d=0.05, theta=0.0) for i in range(30))
+    )
     longer = DHTable(
-        tuple(DHRow(r.name, r.kind, r.a + (1e-4 if i == 12 else 0), r.alpha, r.d, r.theta) for i, r in enumerate(table.rows))
+        tuple(
+            DHRow(name=r.name, kind=r.kind, a=r.a + (1e-4 if i == 12 else 0), alpha=r.alpha, d=r.d, theta=r.theta)
+            for i, r in enumerate(table.rows)
+        )
     )
     axes, links = axes_of(table), links_of(table)
     a, b = (sample_links(evaluate(t), axes, links, rng) for t in (longer, table))
@@ -171,7 +176,7 @@ def certificate(report: Report, name: str) -> Certificate:
 
 @pytest.mark.parametrize("robot", ["humanoid_arm", "iiwa14", "panda", "sixr", "stanford", "ur10", "ur3", "ur5", "ur5e"])
 def test_every_robot_is_certified(models: dict[str, RobotModel], robot: str) -> None:
-    report = crosscheck(models[robot], Options(100, 0, FAST))
+    report = crosscheck(models[robot], Options(samples=100, seed=0, sources=FAST))
     for name in FAST:
         proof = certificate(report, name)
         assert (proof.status, proof.reason) == ("certified", "")
@@ -187,7 +192,7 @@ def test_every_robot_is_certified(models: dict[str, RobotModel], robot: str) -> 
 
 
 def test_ur5_is_proven_to_agree(models: dict[str, RobotModel]) -> None:
-    report = crosscheck(models["ur5"], Options(100, 0, FAST))
+    report = crosscheck(models["ur5"], Options(samples=100, seed=0, sources=FAST))
     for name in FAST:
         proof = certificate(report, name)
         assert max(b.position_upper for b in proof.frames) < 1e-10
@@ -196,7 +201,7 @@ def test_ur5_is_proven_to_agree(models: dict[str, RobotModel]) -> None:
 
 def test_a_longer_d1_is_bracketed(copy_model: Callable[..., Path]) -> None:
     model = load_model(copy_model("ur5", ("dh.csv", "0.089159", "0.089460")))
-    proof = certificate(crosscheck(model, Options(0, 0, FAST)), "urdf:pinocchio")
+    proof = certificate(crosscheck(model, Options(samples=0, seed=0, sources=FAST)), "urdf:pinocchio")
     tool0 = next(b for b in proof.frames if b.frame == "tool0")
     assert tool0.position_found == pytest.approx(0.301e-3, rel=1e-4)
     assert tool0.position_upper == pytest.approx(0.301e-3, rel=1e-4)
@@ -204,7 +209,7 @@ def test_a_longer_d1_is_bracketed(copy_model: Callable[..., Path]) -> None:
 
 def test_iiwas_deviation_is_found_whatever_the_samples(models: dict[str, RobotModel]) -> None:
     """The search behind the certificate finds the largest discrepancy even with no random configuration at all."""
-    report = crosscheck(models["iiwa14"], Options(0, 0, ("urdf:pinocchio",)))
+    report = crosscheck(models["iiwa14"], Options(samples=0, seed=0, sources=("urdf:pinocchio",)))
     assert report.verdict.exit_code == 0
     assert max(b.position_found for b in certificate(report, "urdf:pinocchio").frames) == pytest.approx(2 * 0.00043624, rel=1e-6)
 
@@ -284,7 +289,7 @@ def test_a_broken_premise_is_refused(
     monkeypatch.setattr("harness.run.certifying.GRID_LIMIT", limit)
     known = {**registry.registered(), "dh:fake": Registered("dh:fake", adapter)}
     monkeypatch.setattr(registry, "registered", lambda: known)
-    report = crosscheck(models["stanford"], Options(20, 0, ("dh:fake", "dh:pinocchio"), explain=False))
+    report = crosscheck(models["stanford"], Options(samples=20, seed=0, sources=("dh:fake", "dh:pinocchio"), explain=False))
     proof = certificate(report, "dh:fake")
     assert proof.status == "refused"
     assert proof.frames == []
@@ -299,16 +304,16 @@ def test_a_reference_that_breaks_the_premise_ends_no_run(
 ) -> None:
     known = {**registry.registered(), "dh:fake": Registered("dh:fake", adapter)}
     monkeypatch.setattr(registry, "registered", lambda: known)
-    report = crosscheck(models["stanford"], Options(20, 0, ("dh:numpy",), reference="dh:fake"))
+    report = crosscheck(models["stanford"], Options(samples=20, seed=0, sources=("dh:numpy",), reference="dh:fake"))
     proof = certificate(report, "dh:numpy")
     assert proof.status == "refused"
     assert "dh:fake" in proof.reason
 
 
 def test_the_smaller_of_both_forms_counts(models: dict[str, RobotModel], monkeypatch: pytest.MonkeyPatch) -> None:
-    both = certificate(crosscheck(models["ur5e"], Options(20, 0, FAST, explain=False)), "urdf:pinocchio")
+    both = certificate(crosscheck(models["ur5e"], Options(samples=20, seed=0, sources=FAST, explain=False)), "urdf:pinocchio")
     monkeypatch.setattr("harness.run.certifying.GRID_LIMIT", 10)
-    links = certificate(crosscheck(models["ur5e"], Options(20, 0, FAST, explain=False)), "urdf:pinocchio")
+    links = certificate(crosscheck(models["ur5e"], Options(samples=20, seed=0, sources=FAST, explain=False)), "urdf:pinocchio")
     assert (both.form, links.form) == ("grid", "links")
     for a, b in zip(both.frames, links.frames, strict=True):
         assert a.position_upper <= b.position_upper
@@ -323,11 +328,11 @@ def test_an_engine_that_clamps_agrees_within_limits_but_not_at_the_gate(
     monkeypatch.setattr(registry, "registered", lambda: known)
     folder = copy_model("sixr", ("model.toml", 'name = "dh:pinocchio"', 'name = "dh:fake"'))
     (folder / "configurations.toml").write_text("")
-    sampled = crosscheck(load_model(folder), Options(200, 0, ("dh:fake",), explain=False))
+    sampled = crosscheck(load_model(folder), Options(samples=200, seed=0, sources=("dh:fake",), explain=False))
     assert sampled.verdict.exit_code == 0
     text = (folder / "model.toml").read_text().replace('convention = "modified"', 'convention = "modified"\ngate = "certified"')
     (folder / "model.toml").write_text(text)
-    report = crosscheck(load_model(folder), Options(200, 0, ("dh:fake",), explain=False))
+    report = crosscheck(load_model(folder), Options(samples=200, seed=0, sources=("dh:fake",), explain=False))
     assert report.verdict.exit_code == 1
     assert "is within tolerance where it was sampled, but dh:fake is not the polynomial" in report.verdict.sentence
 
@@ -339,7 +344,7 @@ def test_the_certified_gate(copy_model: Callable[..., Path], tolerance: str, cer
         ("model.toml", 'convention = "standard"', 'convention = "standard"\ngate = "certified"'),
         ("model.toml", "position = 1e-13\nrotation = 1e-13", f"position = {tolerance}\nrotation = {tolerance}"),
     )
-    report = crosscheck(load_model(folder), Options(20, 0, ("urdf:pinocchio",), certify=certify_it))
+    report = crosscheck(load_model(folder), Options(samples=20, seed=0, sources=("urdf:pinocchio",), certify=certify_it))
     assert report.verdict.exit_code == code
     if code and certify_it:
         assert "can be proven for all configurations" in report.verdict.sentence
@@ -352,7 +357,7 @@ def test_coupled_joints_take_more_nodes(copy_model: Callable[..., Path]) -> None
     model = load_model(folder)
     axes = joint_axes(model)
     assert [(axis.degree, round(axis.upper / (2 * math.pi))) for axis in axes] == [(1, 1), (2, 1), (3, 2), (1, 1)]
-    proof = certificate(crosscheck(model, Options(20, 0, FAST, explain=False)), "urdf:pinocchio")
+    proof = certificate(crosscheck(model, Options(samples=20, seed=0, sources=FAST, explain=False)), "urdf:pinocchio")
     assert (proof.status, proof.nodes) == ("certified", 3 * 5 * 7 * 3)
     assert chain_links(model, list(range(6)))[3].joints == (1, 2)
 
@@ -364,7 +369,10 @@ def test_a_factor_that_is_no_fraction(copy_model: Callable[..., Path]) -> None:
     model = load_model(folder)
     with pytest.raises(UncertifiableError, match="'elbow_flex' drives a link by a factor that is no simple fraction"):
         joint_axes(model)
-    assert certificate(crosscheck(model, Options(5, 0, FAST, explain=False)), "dh:pinocchio").status == "refused"
+    assert (
+        certificate(crosscheck(model, Options(samples=5, seed=0, sources=FAST, explain=False)), "dh:pinocchio").status
+        == "refused"
+    )
 
 
 def test_a_joint_that_turns_and_slides(copy_model: Callable[..., Path]) -> None:
@@ -380,7 +388,7 @@ def test_a_joint_that_turns_and_slides(copy_model: Callable[..., Path]) -> None:
 def test_long_chains_go_link_by_link(models: dict[str, RobotModel], monkeypatch: pytest.MonkeyPatch) -> None:
     """The same model both ways: the composed bounds hold too, and are not absurdly loose."""
     monkeypatch.setattr("harness.run.certifying.GRID_LIMIT", 100)
-    report = crosscheck(models["ur5e"], Options(100, 0, FAST, explain=False))
+    report = crosscheck(models["ur5e"], Options(samples=100, seed=0, sources=FAST, explain=False))
     proof = certificate(report, "urdf:pinocchio")
     assert (proof.status, proof.form) == ("certified", "links")
     assert proof.nodes < 60
@@ -398,7 +406,7 @@ def test_a_mimic_follower_on_the_chain(copy_model: Callable[..., Path]) -> None:
     (folder / "configurations.toml").write_text("")
     model = load_model(folder)
     assert [axis.degree for axis in joint_axes(model)] == [1, 1, 3]
-    report = crosscheck(model, Options(300, 0, ("urdf:pinocchio", "urdf:yourdfpy"), explain=False))
+    report = crosscheck(model, Options(samples=300, seed=0, sources=("urdf:pinocchio", "urdf:yourdfpy"), explain=False))
     assert report.verdict.exit_code == 1
     for name in ("urdf:pinocchio", "urdf:yourdfpy"):  # one is passed the follower's value, the other moves it itself
         proof = certificate(report, name)

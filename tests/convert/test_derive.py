@@ -71,7 +71,12 @@ def test_screws_rebuild_every_dh_chain(table: DHTable) -> None:
 
 def test_what_is_no_chain_is_not_rebuilt() -> None:
     """Joint 2 turned by the square of q: no screws can rebuild it, and the residual says so."""
-    table = DHTable((DHRow("a", "revolute", 0.3, 0.5, 0.1, 0.0), DHRow("b", "revolute", 0.2, 0.0, 0.0, 0.0)))
+    table = DHTable(
+        (
+            DHRow(name="a", kind="revolute", a=0.3, alpha=0.5, d=0.1, theta=0.0),
+            DHRow(name="b", kind="revolute", a=0.2, alpha=0.0, d=0.0, theta=0.0),
+        )
+    )
 
     def bent(q: Array) -> Array:
         return chain_of(table)(np.column_stack([q[:, 0], q[:, 1] * np.abs(q[:, 1])]))
@@ -136,7 +141,7 @@ def test_the_gauge_carries_one_chain_to_the_other(T: Array, table: DHTable) -> N
 
 def test_parallel_axes_leave_the_gauge_free() -> None:
     """Three parallel axes fix the turn about them by where they stand; one alone does not."""
-    planar = DHTable(tuple(DHRow(f"j{i}", "revolute", 0.5, 0.0, 0.0, 0.0) for i in range(3)))
+    planar = DHTable(tuple(DHRow(name=f"j{i}", kind="revolute", a=0.5, alpha=0.0, d=0.0, theta=0.0) for i in range(3)))
     S = screws(chain_of(planar), [False] * 3, np.random.default_rng(0)).S
     T = se3.from_xyz_rpy((0.1, -0.2, 0.7), (0, 0, 0.4))
     gauge = fit_gauge(S, S @ adjoint(T).T)
@@ -261,7 +266,7 @@ def test_exported_urdfs_are_the_table(models: dict[str, RobotModel], tmp_path: P
         entries = entries[1:]
     frames = "".join(f'[[frame]]\nname = "{link}"\ndh = "{label}"\nurdf = "{link}"\n' for label, link in entries)
     (folder / "frames.toml").write_text(frames)
-    report = crosscheck(load_model(folder), Options(100, 0))
+    report = crosscheck(load_model(folder), Options(samples=100, seed=0))
     assert report.verdict.exit_code == 0, report.verdict.sentence
     assert len(report.sources[1].frames) == len(entries)
 
@@ -289,7 +294,7 @@ def test_a_calibrated_arm_with_nearly_parallel_axes() -> None:
     a = [2.12234865571206e-05, 0.0193171326277006, -0.569251663611088, -4.61409023720934e-05, -6.39280053471802e-05, 0.0]
     d = [0.180539811714259, 439.140974079901, -446.027059806332, 7.0603368964236, 0.119811341150314, 0.115670917257426]
     alpha = [1.57014608044242, 0.0013941666682559, 0.00693818880325995, 1.56998468543761, -1.57038520649543, 0.0]
-    table = DHTable(tuple(DHRow(f"j{i}", "revolute", a[i], alpha[i], d[i], theta[i]) for i in range(6)))
+    table = DHTable(tuple(DHRow(name=f"j{i}", kind="revolute", a=a[i], alpha=alpha[i], d=d[i], theta=theta[i]) for i in range(6)))
     found = screws(chain_of(table), [False] * 6, np.random.default_rng(0))
     form = canonical(found, [False] * 6, "standard", list(table.joints))
     assert [row.d for row in form.rows[1:4]] == pytest.approx(d[1:4], rel=1e-8)
@@ -298,7 +303,10 @@ def test_a_calibrated_arm_with_nearly_parallel_axes() -> None:
 
 
 def test_nearly_parallel_axes_are_named() -> None:
-    rows = tuple(DHRow(f"j{i}", "revolute", 0.5, alpha, 0.1, 0.0) for i, alpha in enumerate((1e-5, math.pi / 2, 0.0)))
+    rows = tuple(
+        DHRow(name=f"j{i}", kind="revolute", a=0.5, alpha=alpha, d=0.1, theta=0.0)
+        for i, alpha in enumerate((1e-5, math.pi / 2, 0.0))
+    )
     found = screws(chain_of(DHTable(rows)), [False] * 3, np.random.default_rng(0))
     free = canonical(found, [False] * 3, "standard", ["j0", "j1", "j2"]).free
     assert free == ("j0 and j1 are parallel to within 1.0e-05 rad: d is ill-determined",)

@@ -21,16 +21,16 @@ def read(tmp_path: Path, text: str) -> tuple[DHRow, ...]:
 def test_own_format(tmp_path: Path) -> None:
     text = HEADER + "a,revolute,0,pi/2,0.1,-pi\n\n# a comment\nb,prismatic,1,0,0,0 # and another\nc,fixed,0,0,0.5,\n"
     assert read(tmp_path, text) == (
-        DHRow("a", "revolute", 0.0, math.pi / 2, 0.1, -math.pi),
-        DHRow("b", "prismatic", 1.0, 0.0, 0.0, 0.0),
-        DHRow("c", "fixed", 0.0, 0.0, 0.5, 0.0),
+        DHRow(name="a", kind="revolute", a=0.0, alpha=math.pi / 2, d=0.1, theta=-math.pi),
+        DHRow(name="b", kind="prismatic", a=1.0, alpha=0.0, d=0.0, theta=0.0),
+        DHRow(name="c", kind="fixed", a=0.0, alpha=0.0, d=0.5, theta=0.0),
     )
 
 
 def test_the_articles_format(tmp_path: Path) -> None:
     """`name,a,alpha,d,theta_offset` with comments and spaces, every row revolute."""
     text = "# UR5, standard DH\nname, a, alpha, d, theta_offset\nshoulder_pan, 0, 1.5707963267948966, 0.089159, 0\n"
-    assert read(tmp_path, text) == (DHRow("shoulder_pan", "revolute", 0.0, math.pi / 2, 0.089159, 0.0),)
+    assert read(tmp_path, text) == (DHRow(name="shoulder_pan", kind="revolute", a=0.0, alpha=math.pi / 2, d=0.089159, theta=0.0),)
 
 
 def test_windows_line_ends_and_byte_order_mark(tmp_path: Path) -> None:

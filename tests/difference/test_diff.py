@@ -41,7 +41,9 @@ def operand(text: str, base: str | None = None, tip: str | None = None) -> Opera
 
 
 def of_table(table: DHTable, name: str = "made") -> Operand:
-    return Operand(name, table.joints, tuple(table.kind(j) == "prismatic" for j in table.joints), table=table)
+    return Operand(
+        name=name, joints=table.joints, prismatic=tuple(table.kind(j) == "prismatic" for j in table.joints), table=table
+    )
 
 
 def slots(found: Diff) -> list[set[tuple[str, str, str]]]:
@@ -137,7 +139,7 @@ def test_turned_normals_are_the_same_table(convention: str, seed: int) -> None:
     """What the side-by-side view shows of B is still B."""
     rng = np.random.default_rng(seed)
     numbers = rng.uniform(-1, 1, (2, 4, 4))
-    a, b = (tuple(DHRow(f"j{i}", "revolute", *map(float, row)) for i, row in enumerate(rows)) for rows in numbers)
+    a, b = (tuple(DHRow.of(f"j{i}", "revolute", row) for i, row in enumerate(rows)) for rows in numbers)
     shown = turned(a, b, convention)  # type: ignore[arg-type]
     q = rng.uniform(-3, 3, (5, 4))
     tables = [DHTable(tuple(rows), convention) for rows in (b, shown)]  # type: ignore[arg-type]
@@ -178,7 +180,9 @@ def test_a_joint_that_turns_the_other_way_is_found(models: dict[str, RobotModel]
         replace(j, axis=(0.0, 0.0, -1.0)) if j.name in ("panda_joint3", "panda_joint5") else j for j in model.urdf.joint_list
     )
     urdf = replace(model.urdf, joint_list=joints)
-    chain = Operand("turned", model.table.joints, (False,) * 7, urdf=urdf, base="panda_link0", tip="panda_link8")
+    chain = Operand(
+        name="turned", joints=model.table.joints, prismatic=(False,) * 7, urdf=urdf, base="panda_link0", tip="panda_link8"
+    )
     own, other = rows_of(of_table(model.table)), rows_of(chain)
     assert not isinstance(own, str)
     assert not isinstance(other, str)
@@ -223,11 +227,11 @@ def test_a_calibrated_arm_is_identified(tmp_path: Path) -> None:
         (0.0, 0.0, 0.115670917257426, 3.91986209186124e-08),
     )
     names = [f"j{i}" for i in range(1, 7)]
-    calibrated = DHTable(tuple(DHRow(n, "revolute", *row) for n, row in zip(names, rows, strict=True)))
+    calibrated = DHTable(tuple(DHRow.of(n, "revolute", row) for n, row in zip(names, rows, strict=True)))
     nominal = ((0.0, math.pi / 2, 0.1807), (-0.6127, 0.0, 0.0), (-0.57155, 0.0, 0.0), (0.0, math.pi / 2, 0.17415),
                (0.0, -math.pi / 2, 0.11985), (0.0, 0.0, 0.11655))  # fmt: skip
     own = rows_of(of_table(calibrated))
-    other = rows_of(of_table(DHTable(tuple(DHRow(n, "revolute", *r, 0.0) for n, r in zip(names, nominal, strict=True)))))
+    other = rows_of(of_table(DHTable(tuple(DHRow.of(n, "revolute", (*r, 0.0)) for n, r in zip(names, nominal, strict=True)))))
     assert not isinstance(own, str)
     assert not isinstance(other, str)
     largest = match(own, other).largest

@@ -75,7 +75,7 @@ def test_no_configurations(models: dict[str, RobotModel]) -> None:
 
 def test_a_large_offset_is_not_rounded_into_q() -> None:
     """theta + q is formed on the circle: an offset of pi/2 stays exact for every q."""
-    table = DHTable((DHRow("j", "revolute", 1.0, 0.0, 0.0, math.pi / 2),))
+    table = DHTable((DHRow(name="j", kind="revolute", a=1.0, alpha=0.0, d=0.0, theta=math.pi / 2),))
     q = np.linspace(-6, 6, 13)[:, None]
     got = DHNumpy(table).placements(q, ["1"])[:, 0, :2, 3]
     assert np.abs(got - np.column_stack([-np.sin(q[:, 0]), np.cos(q[:, 0])])).max() == 0.0

@@ -256,14 +256,25 @@ def test_float32_origins(source: str, build: Build) -> None:
 
 
 TABLES = {
-    "standard": DHTable((DHRow("a", "revolute", 0.3, 0.4, 0.5, 0.6), DHRow("b", "prismatic", -0.2, 1.1, 0.1, -0.7))),
-    "modified": DHTable((DHRow("a", "revolute", 0.3, 0.4, 0.5, 0.6), DHRow("b", "prismatic", -0.2, 1.1, 0.1, -0.7)), "modified"),
+    "standard": DHTable(
+        (
+            DHRow(name="a", kind="revolute", a=0.3, alpha=0.4, d=0.5, theta=0.6),
+            DHRow(name="b", kind="prismatic", a=-0.2, alpha=1.1, d=0.1, theta=-0.7),
+        )
+    ),
+    "modified": DHTable(
+        (
+            DHRow(name="a", kind="revolute", a=0.3, alpha=0.4, d=0.5, theta=0.6),
+            DHRow(name="b", kind="prismatic", a=-0.2, alpha=1.1, d=0.1, theta=-0.7),
+        ),
+        "modified",
+    ),
     "fixed rows, base and tool": DHTable(
         (
-            DHRow("a", "prismatic", 0.3, 0.4, 0.5, 0.6),
-            DHRow("f", "fixed", 0.1, 0.2, 0.3, 0.4),
-            DHRow("b", "revolute", -0.2, 1.1, 0.1, -0.7),
-            DHRow("g", "fixed", 0.0, -0.3, 0.2, 0.5),
+            DHRow(name="a", kind="prismatic", a=0.3, alpha=0.4, d=0.5, theta=0.6),
+            DHRow(name="f", kind="fixed", a=0.1, alpha=0.2, d=0.3, theta=0.4),
+            DHRow(name="b", kind="revolute", a=-0.2, alpha=1.1, d=0.1, theta=-0.7),
+            DHRow(name="g", kind="fixed", a=0.0, alpha=-0.3, d=0.2, theta=0.5),
         ),
         "modified",
         se3.from_xyz_rpy((0.1, -0.2, 0.3), (0.3, 0.2, 0.1)),
@@ -301,7 +312,7 @@ def test_packaged_robots(build: Build) -> None:
 def test_the_mapping_says_where_a_single_chain_ends(models: dict[str, RobotModel]) -> None:
     """Left to itself ikpy ends a UR5 at ee_link, and a UR5e at base, where no joint moves it."""
     for robot, last in (("ur5", "ee_link"), ("ur5e", "tool0")):
-        report = crosscheck(models[robot], Options(50, 0, ("urdf:ikpy",)))
+        report = crosscheck(models[robot], Options(samples=50, seed=0, sources=("urdf:ikpy",)))
         (source,) = (s for s in report.sources if s.name == "urdf:ikpy")
         assert source.verdict == "agrees"
         assert last in {f.frame for f in source.frames}
@@ -317,7 +328,7 @@ def test_an_oblique_axis_is_wrong_in_one_library_alone(tmp_path: Path) -> None:
     path.write_text(f"<robot name='oblique'><link name='root'/><link name='l1'/><link name='l2'/><link name='l3'/>{text}</robot>")
     derived = derive(read_urdf(path), "root", "l3", "standard", "urdf:pinocchio")
     model = load_model(write_model(derived, "oblique", "urdf:pinocchio", tmp_path))
-    report = crosscheck(model, Options(200, all_engines=True))
+    report = crosscheck(model, Options(samples=200, all_engines=True))
     verdicts = {s.name: s.verdict for s in report.sources if s.name not in WITHOUT}
     assert verdicts.pop("dh:roboticstoolbox-packaged") == "not run"
     assert {name for name, verdict in verdicts.items() if verdict not in ("agrees", "reference")} == {"urdf:roboticstoolbox"}

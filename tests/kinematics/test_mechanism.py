@@ -58,7 +58,15 @@ def urdf_recipe(model: RobotModel, links: tuple[str, ...], reading: Reading | No
     prismatic = tuple(model.table.kind(j) == "prismatic" for j in model.table.joints)
     names = {link: link for link in links}
     base = model.urdf.roots[0]
-    return UrdfRecipe(model.urdf, base, names, model.urdf_joints, model.table.joints, prismatic, reading or Reading())
+    return UrdfRecipe(
+        urdf=model.urdf,
+        base=base,
+        frames=names,
+        joints=model.urdf_joints,
+        model_joints=model.table.joints,
+        prismatic=prismatic,
+        reading=reading or Reading(),
+    )
 
 
 @pytest.mark.parametrize("robot", ["humanoid_arm", "iiwa14", "panda", "sixr", "stanford", "ur5", "ur5e"])

@@ -100,7 +100,7 @@ def test_plotly_is_packed_the_same_each_time() -> None:
 
 
 def test_every_drawn_number_is_one_compared(models: dict[str, RobotModel]) -> None:
-    report = crosscheck(models["ur5"], Options(50, 0, ("dh:pinocchio", "urdf:pinocchio")))
+    report = crosscheck(models["ur5"], Options(samples=50, seed=0, sources=("dh:pinocchio", "urdf:pinocchio")))
     figures = skeletons(report)
     assert set(figures) == {"source-1", "source-2"}
     for key, figure in figures.items():
@@ -121,7 +121,7 @@ def test_every_drawn_number_is_one_compared(models: dict[str, RobotModel]) -> No
 
 
 def test_what_is_drawn_has_a_budget(models: dict[str, RobotModel], monkeypatch: pytest.MonkeyPatch) -> None:
-    report = crosscheck(models["ur5"], Options(20, 0, ("dh:pinocchio", "urdf:pinocchio"), certify=False))
+    report = crosscheck(models["ur5"], Options(samples=20, seed=0, sources=("dh:pinocchio", "urdf:pinocchio"), certify=False))
     worse = [s.model_copy(update={"verdict": "disagrees"}) if s.name == "urdf:pinocchio" else s for s in report.sources]
     report = report.model_copy(update={"sources": worse})
     one = len(json.dumps(skeletons(report)["source-2"]))

@@ -61,7 +61,9 @@ def rename(part: Any, old: str, new: str) -> Any:
 def disagreeing(tmp_path_factory: pytest.TempPathFactory) -> Report:
     """A report in which the frame, the joint, the source and the texts that matter have names that can be replaced."""
     folder = copied(tmp_path_factory.mktemp("hostile"), "ur5", ("dh.csv", "0.089159", "0.089460"))
-    report = crosscheck(load_model(folder), Options(50, 0, ("dh:pinocchio", "urdf:pinocchio"), command="COMMAND"))
+    report = crosscheck(
+        load_model(folder), Options(samples=50, seed=0, sources=("dh:pinocchio", "urdf:pinocchio"), command="COMMAND")
+    )
     document = json.loads(to_json(report))
     for old in ("tool0", "shoulder_pan_joint"):
         document = rename(document, old, "NAME")
@@ -150,7 +152,13 @@ def test_terminal(disagreeing: Report, name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_the_table_of_a_view(name: str) -> None:
     def page(name: str) -> str:
-        return table("reference", [name], {name: name}, np.zeros(1), [Apart(name, name, 1.0, 1.0, False)])
+        return table(
+            "reference",
+            [name],
+            {name: name},
+            np.zeros(1),
+            [Apart(source=name, frame=name, position=1.0, rotation=1.0, within=False)],
+        )
 
     assert shape(page(name)) == shape(page("NAME"))
     assert words(plain(name)) in words(lxml_html.document_fromstring(page(name)).text_content())

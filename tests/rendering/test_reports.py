@@ -30,13 +30,17 @@ FAST = ("dh:pinocchio", "urdf:pinocchio")
 
 @pytest.fixture(scope="module")
 def reports(models: dict[str, RobotModel]) -> dict[str, Report]:
-    return {name: crosscheck(model, Options(100, 0, FAST, command=f"crosscheck run {name}")) for name, model in models.items()}
+    return {
+        name: crosscheck(model, Options(samples=100, seed=0, sources=FAST, command=f"crosscheck run {name}"))
+        for name, model in models.items()
+    }
 
 
 @pytest.fixture
 def disagreeing(copy_model: Callable[..., Path]) -> Report:
     return crosscheck(
-        load_model(copy_model("ur5", ("dh.csv", "0.089159", "0.089460"))), Options(100, 0, FAST, command="crosscheck run ur5")
+        load_model(copy_model("ur5", ("dh.csv", "0.089159", "0.089460"))),
+        Options(samples=100, seed=0, sources=FAST, command="crosscheck run ur5"),
     )
 
 

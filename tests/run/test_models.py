@@ -171,7 +171,7 @@ def test_offsets_of_rigid_frames_come_from_whichever_source_has_them(models: dic
     """What the first source lacks is measured with the next, and not taken to be no offset at all."""
     command = (sys.executable, str(Path(__file__).parents[1] / "workers" / "faulty_worker.py"), "has a few links")
     partial = (("urdf:controller", command),)
-    options = Options(20, 0, ("urdf:controller", "urdf:pinocchio"), workers=partial, certify=False)
+    options = Options(samples=20, seed=0, sources=("urdf:controller", "urdf:pinocchio"), workers=partial, certify=False)
     report = crosscheck(models["ur3"], options)
     assert report.verdict.exit_code == 0
     measured = {f.name: f.measured_from for f in report.frames if f.relation == "rigid"}
@@ -199,7 +199,7 @@ def test_the_reference_may_not_be_without_a_frame(copy_model: Callable[..., Path
     folder = copy_model("ur5")
     with (folder / "frames.toml").open("a") as file:
         file.write('[engine."dh:numpy"]\nwithout = ["shoulder_link"]\n')
-    report = crosscheck(load_model(folder), Options(5, 0, ("dh:pinocchio",)))
+    report = crosscheck(load_model(folder), Options(samples=5, seed=0, sources=("dh:pinocchio",)))
     assert report.verdict.exit_code == 3
     assert "cannot be the reference: it does not have shoulder_link" in report.verdict.sentence
 

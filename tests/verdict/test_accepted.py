@@ -26,7 +26,7 @@ Cli = Callable[..., "subprocess.CompletedProcess[str]"]
 
 @pytest.fixture(scope="module")
 def report(models: dict[str, RobotModel]) -> Report:
-    return crosscheck(models["sixr"], Options(50, 0, FAST, command="crosscheck run sixr"))
+    return crosscheck(models["sixr"], Options(samples=50, seed=0, sources=FAST, command="crosscheck run sixr"))
 
 
 def changed(report: Report, name: str, **update: object) -> Report:
@@ -75,7 +75,9 @@ def test_only_more_than_the_noise_floor_counts(report: Report, by: float, moves:
 
 
 def test_the_floor_of_a_float32_source_is_its_own(models: dict[str, RobotModel]) -> None:
-    report = crosscheck(models["sixr"], Options(20, 0, ("urdf:pinocchio", "urdf:pytorch-kinematics"), certify=False))
+    report = crosscheck(
+        models["sixr"], Options(samples=20, seed=0, sources=("urdf:pinocchio", "urdf:pytorch-kinematics"), certify=False)
+    )
     floors = {s.name: s.floor for s in report.sources}
     assert floors["urdf:pytorch-kinematics"] == 1e-6
     assert floors["urdf:pinocchio"] < 1e-12
@@ -126,7 +128,7 @@ def test_other_settings_cannot_be_compared(report: Report) -> None:
 
 def test_fewer_configurations_are_a_part_of_those_accepted(report: Report, models: dict[str, RobotModel]) -> None:
     numbers = accepted_from(report)
-    fewer = crosscheck(models["sixr"], Options(20, 0, FAST, command="crosscheck run sixr"))
+    fewer = crosscheck(models["sixr"], Options(samples=20, seed=0, sources=FAST, command="crosscheck run sixr"))
     found = since(numbers, fewer, True)
     assert not found.worse
     assert found.note == "looked at 20 of the 50 random configurations accepted"

@@ -27,7 +27,7 @@ FAST = ("dh:pinocchio", "urdf:pinocchio")
 
 
 def check(folder: Path, *sources: str, samples: int = 200) -> Report:
-    return crosscheck(load_model(folder), Options(samples, 0, sources or FAST))
+    return crosscheck(load_model(folder), Options(samples=samples, seed=0, sources=sources or FAST))
 
 
 def source(report: Report, name: str) -> Source:
@@ -38,7 +38,7 @@ def source(report: Report, name: str) -> Source:
 def test_all_robots_agree_in_all_engines(models: dict[str, RobotModel], robot: str) -> None:
     model = models[robot]
     wanted = [entry.name for entry in model.file.source if entry.name not in WITHOUT]
-    report = crosscheck(model, Options(2000, 0, tuple(wanted)))
+    report = crosscheck(model, Options(samples=2000, seed=0, sources=tuple(wanted)))
     assert report.verdict.exit_code == 0, report.verdict.reasons
     assert {s.name for s in report.sources} == {"dh:numpy", *wanted}
     assert all(s.status == "ran" for s in report.sources)
@@ -50,7 +50,7 @@ def test_all_robots_agree_in_all_engines(models: dict[str, RobotModel], robot: s
 def test_ur5_to_the_noise_floor_of_each_source(models: dict[str, RobotModel]) -> None:
     model = models["ur5"]
     wanted = tuple(entry.name for entry in model.file.source if entry.name not in WITHOUT)
-    report = crosscheck(model, Options(2000, 0, wanted))
+    report = crosscheck(model, Options(samples=2000, seed=0, sources=wanted))
     limits = {"dh:pinocchio": 1e-14, "urdf:pinocchio": 1e-11, "urdf:yourdfpy": 1e-11, "urdf:pytorch-kinematics": 1e-7}
     noise = {"dh:pinocchio": "float64", "urdf:pinocchio": "pi-12-digits", "urdf:pytorch-kinematics": "float32"}
     for name in wanted:
@@ -162,7 +162,7 @@ def test_a_rigid_frame_that_is_not_rigid(copy_model: Callable[..., Path]) -> Non
 
 
 def test_a_rigid_offset_is_measured_to_rounding(models: dict[str, RobotModel]) -> None:
-    report = crosscheck(models["ur5"], Options(10, 0, FAST))
+    report = crosscheck(models["ur5"], Options(samples=10, seed=0, sources=FAST))
     frame = next(f for f in report.frames if f.name == "upper_arm_link")
     assert (frame.relation, frame.measured_from) == ("rigid", "urdf:pinocchio")
     offset = np.array(frame.offset)
@@ -174,9 +174,9 @@ def test_a_rigid_offset_is_measured_to_rounding(models: dict[str, RobotModel]) -
 
 
 def test_published_values(models: dict[str, RobotModel]) -> None:
-    ur5 = crosscheck(models["ur5"], Options(0, 0, ("dh:pinocchio",)))
+    ur5 = crosscheck(models["ur5"], Options(samples=0, seed=0, sources=("dh:pinocchio",)))
     assert [p.found for p in ur5.published] == ["holds"] * 11
-    humanoid = crosscheck(models["humanoid_arm"], Options(0, 0, ("dh:pinocchio",)))
+    humanoid = crosscheck(models["humanoid_arm"], Options(samples=0, seed=0, sources=("dh:pinocchio",)))
     assert humanoid.verdict.exit_code == 0
     computed = [[row[3] for row in p.computed[:3]] for p in humanoid.published]
     expected = [[0.630, -0.060, 0.050], [0.300, -0.060, 0.380], [0.491726, 0.200261, 0.185065]]
@@ -221,7 +221,9 @@ def test_accepted_deviations_are_strict(copy_model: Callable[..., Path], edit: E
 
 def test_a_deviation_belongs_to_the_source_not_to_the_reference(models: dict[str, RobotModel]) -> None:
     """Seen from the URDF the table deviates by the same amount, and two URDF sources agree."""
-    report = crosscheck(models["iiwa14"], Options(2000, 0, ("dh:numpy", "urdf:yourdfpy"), reference="urdf:pinocchio"))
+    report = crosscheck(
+        models["iiwa14"], Options(samples=2000, seed=0, sources=("dh:numpy", "urdf:yourdfpy"), reference="urdf:pinocchio")
+    )
     assert report.verdict.exit_code == 0
     assert source(report, "dh:numpy").verdict == "agrees as accepted"
     assert source(report, "urdf:yourdfpy").verdict == "agrees"
@@ -312,7 +314,7 @@ def test_an_engine_that_goes_wrong_is_that_engines_result(
     reason: str,
 ) -> None:
     with_fake(adapter)
-    report = crosscheck(models["ur5"], Options(600, 0, ("dh:fake", "dh:pinocchio")))
+    report = crosscheck(models["ur5"], Options(samples=600, seed=0, sources=("dh:fake", "dh:pinocchio")))
     fake = source(report, "dh:fake")
     assert (fake.status, fake.verdict, report.verdict.exit_code) == (status, verdict, code)
     assert reason in fake.reason
@@ -336,7 +338,7 @@ def test_required_and_optional(
     text = (folder / "model.toml").read_text().split("[[source]]")[0]
     text += f'[[source]]\nname = "dh:pinocchio"\n[[source]]\nname = "dh:fake"\nrequired = {str(required).lower()}\n'
     (folder / "model.toml").write_text(text)
-    report = crosscheck(load_model(folder), Options(10))
+    report = crosscheck(load_model(folder), Options(samples=10))
     assert report.verdict.exit_code == code
     assert "dh:fake" in report.verdict.sentence
     status = source(report, "dh:fake").status
@@ -354,7 +356,7 @@ def test_an_optional_source_that_disagrees_still_fails(
 
     with_fake(Shifted)
     folder = copy_model("ur5", ("model.toml", 'name = "dh:pinocchio"', 'name = "dh:fake"\nrequired = false'))
-    report = crosscheck(load_model(folder), Options(10))
+    report = crosscheck(load_model(folder), Options(samples=10))
     assert report.verdict.exit_code == 1
 
 
@@ -363,7 +365,7 @@ def test_when_the_reference_is_missing_nothing_is_verified(
 ) -> None:
     for adapter in (Missing, RaisesLate):
         with_fake(adapter)
-        report = crosscheck(models["ur5"], Options(600, 0, ("dh:pinocchio",), reference="dh:fake"))
+        report = crosscheck(models["ur5"], Options(samples=600, seed=0, sources=("dh:pinocchio",), reference="dh:fake"))
         assert report.verdict.exit_code == 3
         assert all(not s.frames for s in report.sources)
         assert source(report, "dh:pinocchio").status == "not run"
@@ -376,7 +378,7 @@ def test_when_every_optional_source_is_missing_nothing_passes(
     folder = copy_model("ur5")
     text = (folder / "model.toml").read_text().split("[[source]]")[0]
     (folder / "model.toml").write_text(text + '[[source]]\nname = "dh:fake"\nrequired = false\n')
-    report = crosscheck(load_model(folder), Options(10))
+    report = crosscheck(load_model(folder), Options(samples=10))
     assert report.verdict.exit_code == 3
     assert "no source was compared" in report.verdict.sentence
 
@@ -392,7 +394,7 @@ def test_an_engine_that_lacks_a_mapped_link_does_not_agree(
 ) -> None:
     known = {**registry.registered(), "urdf:pinocchio": Registered("urdf:pinocchio", DropsTool)}
     monkeypatch.setattr(registry, "registered", lambda: known)
-    report = crosscheck(models["ur5"], Options(10, 0, ("urdf:pinocchio",)))
+    report = crosscheck(models["ur5"], Options(samples=10, seed=0, sources=("urdf:pinocchio",)))
     assert report.verdict.exit_code == 1
     assert "frame tool0 was not compared" in report.verdict.sentence
 
@@ -414,15 +416,18 @@ def test_wrong_options(models: dict[str, RobotModel], options: dict[str, object]
 
 def test_the_same_command_twice_gives_the_same_numbers(models: dict[str, RobotModel]) -> None:
     wanted = tuple(entry.name for entry in models["ur5"].file.source if entry.name not in WITHOUT)
-    first, second = (crosscheck(models["ur5"], Options(300, 5, wanted)) for _ in range(2))
+    first, second = (crosscheck(models["ur5"], Options(samples=300, seed=5, sources=wanted)) for _ in range(2))
     same = {"environment": first.environment}
     assert to_json(first.model_copy(update=same)) == to_json(second.model_copy(update=same))
-    other = crosscheck(models["ur5"], Options(300, 6, wanted)).model_copy(update=same)
+    other = crosscheck(models["ur5"], Options(samples=300, seed=6, sources=wanted)).model_copy(update=same)
     assert to_json(first.model_copy(update=same)) != to_json(other)
 
 
 def test_tolerances_add_up_against_another_reference(models: dict[str, RobotModel]) -> None:
-    report = crosscheck(models["ur5"], Options(50, 0, ("dh:numpy", "dh:pinocchio", "urdf:yourdfpy"), reference="urdf:pinocchio"))
+    report = crosscheck(
+        models["ur5"],
+        Options(samples=50, seed=0, sources=("dh:numpy", "dh:pinocchio", "urdf:yourdfpy"), reference="urdf:pinocchio"),
+    )
     assert report.verdict.exit_code == 0
     assert source(report, "dh:numpy").tolerance.position == 1e-10
     assert source(report, "dh:pinocchio").tolerance.position == pytest.approx(1e-10 + 1e-13)
@@ -431,8 +436,10 @@ def test_tolerances_add_up_against_another_reference(models: dict[str, RobotMode
 
 def test_a_dh_frame_without_a_link_is_left_out_against_a_urdf_reference(models: dict[str, RobotModel]) -> None:
     """Stanford's dh0 has no link: no fault of the table's, and none of the URDF's."""
-    report = crosscheck(models["stanford"], Options(20, 0, ("dh:numpy", "dh:pinocchio"), reference="urdf:pinocchio"))
+    report = crosscheck(
+        models["stanford"], Options(samples=20, seed=0, sources=("dh:numpy", "dh:pinocchio"), reference="urdf:pinocchio")
+    )
     assert report.verdict.exit_code == 0, report.verdict.reasons
     assert "dh0" not in {f.frame for f in source(report, "dh:numpy").frames}
-    report = crosscheck(models["stanford"], Options(20, 0, FAST))
+    report = crosscheck(models["stanford"], Options(samples=20, seed=0, sources=FAST))
     assert "dh0" in {f.frame for f in source(report, "dh:pinocchio").frames}

@@ -26,7 +26,7 @@ from harness.view.session import Session
 from harness.workers.pool import Workers
 from tests.helpers import copied, transforms
 
-FAST = Options(50, 0, ("dh:pinocchio", "urdf:pinocchio"), certify=False, explain=False)
+FAST = Options(samples=50, seed=0, sources=("dh:pinocchio", "urdf:pinocchio"), certify=False, explain=False)
 
 
 @pytest.fixture(scope="module")
@@ -106,8 +106,12 @@ def test_places_are_the_published_the_worst_and_the_singular(session: Session) -
 
 
 def test_a_source_that_fails_later_is_left_out(models: dict[str, RobotModel]) -> None:
-    with Options(10, 0, ("dh:pinocchio",), certify=False, explain=False, in_process=True).workshop() as workers:
-        session = Session(models["sixr"], Options(10, 0, ("dh:pinocchio",), certify=False, explain=False), workers)
+    with Options(
+        samples=10, seed=0, sources=("dh:pinocchio",), certify=False, explain=False, in_process=True
+    ).workshop() as workers:
+        session = Session(
+            models["sixr"], Options(samples=10, seed=0, sources=("dh:pinocchio",), certify=False, explain=False), workers
+        )
         bound = session.results.participants[1].bound
         assert bound is not None
 
@@ -121,7 +125,12 @@ def test_a_source_that_fails_later_is_left_out(models: dict[str, RobotModel]) ->
 
 def test_a_reference_that_does_not_run_is_told(models: dict[str, RobotModel], tmp_path: Path) -> None:
     options = Options(
-        10, 0, ("dh:numpy",), "missing", workers=(("missing", (sys.executable, str(tmp_path / "none.py"))),), explain=False
+        samples=10,
+        seed=0,
+        sources=("dh:numpy",),
+        reference="missing",
+        workers=(("missing", (sys.executable, str(tmp_path / "none.py"))),),
+        explain=False,
     )
     with Workers() as workers, pytest.raises(EngineFailed, match="the reference does not run"):
         Session(models["sixr"], options, workers)

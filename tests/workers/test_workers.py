@@ -164,7 +164,13 @@ def test_nothing_is_held_of_robots_that_are_done(models: dict[str, RobotModel]) 
     with Workers(LIMITS) as workers:
         counts = []
         for fault in ("none", "refuses", "misspells a frame", "none", "exits at once"):
-            options = Options(5, 0, ("dh:pinocchio",), certify=False, workers=(("controller", (sys.executable, WORKER, fault)),))
+            options = Options(
+                samples=5,
+                seed=0,
+                sources=("dh:pinocchio",),
+                certify=False,
+                workers=(("controller", (sys.executable, WORKER, fault)),),
+            )
             crosscheck(models["ur3"], options, None, workers)
             counts.append((open_files(), len([p for p in below() if WORKER in " ".join(p.cmdline())])))
         assert not any(programs for _, programs in counts)
@@ -177,7 +183,7 @@ def test_an_optional_one_that_fails_does_not_fail_the_gate_and_is_named(copy_mod
     sources = f'[[source]]\nname = "controller"\nrequired = false\ncommand = ["{sys.executable}", "{WORKER}", "exits at once"]\n'
     text = (folder / "model.toml").read_text().split("[[source]]")[0]
     (folder / "model.toml").write_text(f'{text}{sources}[[source]]\nname = "dh:pinocchio"\n')
-    report = crosscheck(load_model(folder), Options(100, certify=False))
+    report = crosscheck(load_model(folder), Options(samples=100, certify=False))
     assert report.verdict.exit_code == 0
     assert "failed: controller" in report.verdict.sentence
     assert "no licence found" in named(report, "controller").reason
@@ -198,7 +204,7 @@ def test_a_command_that_is_not_there(models: dict[str, RobotModel]) -> None:
 def test_in_process_starts_nothing(models: dict[str, RobotModel]) -> None:
     before = len(below())
     report = crosscheck(
-        models["ur3"], Options(10, sources=("dh:pinocchio",), in_process=True), lambda done, total: in_run(before)
+        models["ur3"], Options(samples=10, sources=("dh:pinocchio",), in_process=True), lambda done, total: in_run(before)
     )
     assert report.verdict.exit_code == 0
 
