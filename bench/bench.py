@@ -19,7 +19,7 @@ import pinocchio as pin
 import pytorch_kinematics as pk
 import torch
 
-import harness.verdict.crosscheck
+import harness.run.robot
 from harness.certificate.interpolation import Axis, grid
 from harness.certificate.joint_axes import joint_axes
 from harness.certificate.links import Link, certify_links, sample_links
@@ -32,7 +32,7 @@ from harness.engines.registry import load_engine
 from harness.run.binding import bind
 from harness.run.certifying import certify_all
 from harness.run.options import Options
-from harness.run.results import Certified, Results
+from harness.run.outcome import Run
 from harness.verdict.crosscheck import crosscheck
 from harness.workers.pool import Workers
 
@@ -155,13 +155,12 @@ def certificate_rows() -> list[tuple[str, float, float, str]]:
         if len(nodes) != count:
             raise RuntimeError(f"expected {count} grid points, got {len(nodes)}")
 
-        def timed(results: Results, workers: Workers, spent: list[float] = spent) -> dict[str, Certified]:
+        def timed(run: Run, workers: Workers, spent: list[float] = spent) -> None:
             start = time.perf_counter()
-            certified = certify_all(results, workers)
+            certify_all(run, workers)
             spent.append(time.perf_counter() - start)
-            return certified
 
-        setattr(harness.verdict.crosscheck, "certify_all", timed)  # noqa: B010 - not exported there, on purpose
+        setattr(harness.run.robot, "certify_all", timed)  # noqa: B010 - not exported there, on purpose
         ratios = []
         for _ in range(ROUNDS + 1):
             crosscheck(model, Options(samples=0, seed=0, sources=("dh:pinocchio",)))
@@ -171,7 +170,7 @@ def certificate_rows() -> list[tuple[str, float, float, str]]:
         rows.append(
             (f"(certificate of {robot} - 50 ms) / {count} evaluations in both", statistics.median(ratios[1:]), 3.0, "at most")
         )
-    setattr(harness.verdict.crosscheck, "certify_all", certify_all)  # noqa: B010
+    setattr(harness.run.robot, "certify_all", certify_all)  # noqa: B010
     return rows
 
 

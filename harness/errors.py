@@ -1,20 +1,32 @@
 """Everything the harness refuses, as one tree of exceptions.
 
 Each error keeps its facts as fields and prints as one line: where, what was expected and what came, the way out.
-The exit codes are those of the gate: 1 disagreement (not an error), 2 wrong input, 3 a source that is missing or failed.
+`ExitCode` lists what the command can end with.
 """
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from enum import IntEnum
 from os import PathLike
+
+
+class ExitCode(IntEnum):
+    """What the command ends with. `harness.verdict.gate.combined` says which one counts if several apply."""
+
+    AGREES = 0
+    DISAGREES = 1
+    WRONG_INPUT = 2
+    NOT_VERIFIED = 3  # a required source is missing or failed
+    INTERRUPTED = 130
+    PIPE_CLOSED = 141
 
 
 class CrosscheckError(Exception):
     """Base of all errors the harness raises on purpose."""
 
-    exit_code = 2
+    exit_code = ExitCode.WRONG_INPUT
 
 
 class InputError(CrosscheckError, ValueError):
@@ -62,13 +74,13 @@ class MappingError(ModelFileError):
 class DescriptionUnavailable(CrosscheckError, RuntimeError):
     """The package that holds a model's URDF is not installed."""
 
-    exit_code = 3
+    exit_code = ExitCode.NOT_VERIFIED
 
 
 class EngineUnavailable(CrosscheckError, RuntimeError):
     """An engine cannot be used here. Fields: `source`, `reason`, `install` (a command, or None)."""
 
-    exit_code = 3
+    exit_code = ExitCode.NOT_VERIFIED
 
     def __init__(self, source: str, reason: str, install: str | None = None) -> None:
         self.source = source
@@ -80,7 +92,7 @@ class EngineUnavailable(CrosscheckError, RuntimeError):
 class EngineFailed(CrosscheckError, RuntimeError):
     """An engine ran and failed. Fields: `source`, `reason`."""
 
-    exit_code = 3
+    exit_code = ExitCode.NOT_VERIFIED
 
     def __init__(self, source: str, reason: str) -> None:
         self.source = source

@@ -6,9 +6,11 @@ import functools
 import math
 import shutil
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 from hypothesis import strategies as st
+from pydantic import BaseModel
 
 from harness import se3
 from harness.description.dh import DHRow, DHTable
@@ -18,9 +20,12 @@ from harness.report.document import Report
 from harness.run.options import Options
 from harness.se3 import Array
 from harness.verdict import crosscheck as module
+from harness.verdict.accepted import AcceptedNumbers, since
+from harness.verdict.gate import held_to
 from harness.workers.pool import Workers
 
 Edit = tuple[str, str, str]
+P = TypeVar("P", bound=BaseModel)
 
 
 def copied(folder: Path, robot: str, *edits: Edit) -> Path:
@@ -46,6 +51,17 @@ def shared_workers() -> Workers:
 def crosscheck(model: RobotModel, options: Options) -> Report:
     """`harness.verdict.crosscheck.crosscheck` without starting every engine anew."""
     return module.crosscheck(model, options, None, shared_workers())
+
+
+def remade(part: P, **fields: Any) -> P:
+    """A part of a document with other fields, through its constructor: what is misspelt or of another type fails."""
+    return type(part)(**{**{name: getattr(part, name) for name in type(part).model_fields}, **fields})
+
+
+def compared(report: Report, numbers: AcceptedNumbers, strict: bool) -> Report:
+    """The report with what moved since these numbers were accepted, as a run with them on file gives it."""
+    moved = since(numbers, report, strict)
+    return remade(report, regression=moved, verdict=held_to(report.verdict, report.robot.name, moved))
 
 
 def assert_placements_close(got: Array, expected: Array, atol: float) -> None:

@@ -19,7 +19,8 @@ from harness.engines.base import Engine
 from harness.engines.registry import adapter_of, description_of, registered
 from harness.errors import EngineFailed, EngineUnavailable, InputError
 from harness.report.text import plain
-from harness.run.binding import bind, wanted_frames
+from harness.run.binding import bind
+from harness.run.naming import wanted_frames
 from harness.workers import protocol
 from harness.workers.conformance import Finding, examine
 from harness.workers.environments import cache_folder

@@ -24,8 +24,9 @@ from harness.rendering.terminal import show
 from harness.report.document import Report
 from harness.report.text import plain
 from harness.run.options import Options
-from harness.verdict.accepted import FOLDER, AcceptedNumbers, compared, read_accepted
+from harness.verdict.accepted import FOLDER, AcceptedNumbers, read_accepted
 from harness.verdict.crosscheck import crosscheck
+from harness.verdict.gate import combined
 from harness.workers.process import Limits
 
 
@@ -155,13 +156,14 @@ def run(
         limits=limits,
         jobs=jobs,
         in_process=in_process,
+        strict=strict,
     )
     folders = folders_of(robots, models or default_models_dir())
     prepare(out)
     codes: list[int] = []
     names: dict[str, Path] = {}
     reports: list[Report] = []
-    with options.workshop() as workshop:
+    with options.worker_pool() as pool:
         for folder in folders:
             try:
                 model = load_model(folder)
@@ -170,10 +172,8 @@ def run(
                 names[model.name] = folder
                 on_file = _on_file(accepted / f"{model.name}.json", strict)
                 with progress_bar(model.name, quiet or as_json) as advance:
-                    report = crosscheck(
-                        model, options.reproduced_by(_command(folder, models, options, strict)), advance, workshop
-                    )
-                report = report if on_file is None else compared(report, on_file, strict)
+                    command = _command(folder, models, options, strict)
+                    report = crosscheck(model, options.reproduced_by(command), advance, pool, on_file)
                 write_report(report, out)
                 write_summary(report)
                 _tell(report, quiet, as_json)
@@ -187,7 +187,7 @@ def run(
         if all_engines:
             show_engine_table(reports, console())
         console().print(f"{codes.count(0)} of {len(codes)} robots agree; reports in {plain(str(out))}", markup=False)
-    return min((code for code in codes if code), default=0)
+    return combined(codes)
 
 
 def folders_of(robots: tuple[str, ...], models: Path) -> list[Path]:

@@ -60,8 +60,8 @@ def view(
     model = load_model(find_model(robot, models or default_models_dir()))
     options = Options(samples=samples, seed=seed, sources=sources, reference=reference, certify=False, explain=False)
     logging.getLogger("websockets").setLevel(logging.ERROR)  # a browser that goes away is no error of ours
-    with options.workshop() as workshop:
-        session = Session(model, options, workshop)
+    with options.worker_pool() as workers:
+        session = Session(model, options, workers)
         with contextlib.redirect_stdout(io.StringIO()):  # its banner; the address is told below
             server = viser.ViserServer(host=LOOPBACK, port=port, label=plain(model.name), verbose=False)
         try:

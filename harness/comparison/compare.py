@@ -137,7 +137,7 @@ class Comparison:
     @staticmethod
     def _usable(finite: Mask, view: View) -> Mask:
         """Mask of mapped frames whose raw placement, and base, is finite: an invalid but finite one is still measured."""
-        mask: Mask = finite[[view.slots[f] for f in view.available]]
+        mask: Mask = finite[view.picked]
         return mask if view.base is None else np.logical_and(mask, finite[view.base])
 
     def _common(

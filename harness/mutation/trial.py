@@ -20,7 +20,6 @@ from harness.report import explanation as reasons
 from harness.run.options import Options
 from harness.verdict.crosscheck import crosscheck
 from harness.verdict.deviations import deviation_on_file
-from harness.verdict.gate import FAILING
 
 SAMPLES = 200
 NOTHING = 1e-13  # an effect below is none: rounding of the models
@@ -60,7 +59,7 @@ def _judged(mutant: Mutant, original: RobotModel, source: doc.Source, effect: Ef
     trial = trial.model_copy(update={"effect": largest})
     if source.status != "ran":
         return trial.model_copy(update={"outcome": "refused", "note": source.reason})
-    flagged = source.verdict in FAILING
+    flagged = source.verdict.disagrees
     if largest <= NOTHING or mutant.equivalent:
         if mutant.equivalent and largest > NOTHING:
             return trial.model_copy(update={"outcome": "missed", "note": f"not equivalent after all: {largest:.2g}"})

@@ -11,6 +11,7 @@ from rich.text import Text
 
 from harness.report.document import Report, Source
 from harness.report.text import metres, plain
+from harness.report.verdicts import Verdict
 
 
 def show_engine_table(reports: Sequence[Report], console: Console) -> None:
@@ -26,7 +27,7 @@ def show_engine_table(reports: Sequence[Report], console: Console) -> None:
         counts = Counter(source.verdict for _, source in entries)
         verdict = ", ".join(f"{count} {text}" for text, count in counts.items())
         bad = {source.verdict for _, source in entries if not source.passes}
-        style = "red" if bad - {"not run"} else "yellow" if bad else "green"
+        style = "red" if bad - {Verdict.NOT_RUN} else "yellow" if bad else "green"
         cells = (name, _versions(entries), verdict, _largest(entries), _notes(entries))
         table.add_row(*(Text(plain(cell), style=style if cell is verdict else "") for cell in cells))
     console.print(table)

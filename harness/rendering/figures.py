@@ -15,6 +15,7 @@ from harness.report.document import Report, Source
 from harness.report.pose import FramePair, Pose
 from harness.report.source_parts import Statistics
 from harness.report.text import metres, plain, radians
+from harness.report.verdicts import Verdict
 from harness.se3 import Array, position_error, rotation_error
 
 REFERENCE, SOURCE = "#0072B2", "#D55E00"
@@ -44,11 +45,11 @@ def skeletons(report: Report) -> dict[str, Figure]:
     order = {label.label: i for i, label in enumerate(report.trees.dh)}
     rank = {frame.name: order.get(frame.dh, len(order)) for frame in report.frames}
     spent = 0
-    for i, source in sorted(enumerate(report.sources), key=lambda pair: pair[1].verdict == "agrees"):
+    for i, source in sorted(enumerate(report.sources), key=lambda pair: pair[1].verdict is Verdict.AGREES):
         if source.pose is None:
             continue
         pose = source.pose.model_copy(update={"frames": sorted(source.pose.frames, key=lambda f: rank[f.frame])})
-        factor = _factor(pose) if source.verdict != "agrees" else 1.0
+        factor = _factor(pose) if source.verdict is not Verdict.AGREES else 1.0
         figure = {
             "true": _traces(pose, report.settings.reference, source.name, 1.0),
             "magnified": _traces(pose, report.settings.reference, source.name, factor) if factor > 1.0 else None,

@@ -33,6 +33,7 @@ from harness.report.text import (
     quantity,
     radians,
 )
+from harness.report.verdicts import Verdict
 
 # ColorBrewer YlOrBr: light to dark, told apart by the colour-blind, always with the number beside it.
 _SCALE = ("#ffffe5", "#fff7bc", "#fee391", "#fec44f", "#fe9929", "#ec7014", "#cc4c02", "#993404", "#662506")
@@ -114,13 +115,15 @@ def render_index(reports: Sequence[Report]) -> str:
 def failing(report: Report) -> list[Source]:
     """The sources that do not pass, those that disagree first."""
     bad = [s for s in report.sources if not s.passes and (s.required or s.status != "not run")]
-    return sorted(bad, key=lambda s: s.verdict in ("not run", "failed"))
+    return sorted(bad, key=lambda s: s.verdict in (Verdict.NOT_RUN, Verdict.FAILED))
 
 
 def posed(report: Report) -> list[Source]:
     """The sources with a picture: first those that disagree, then those that do as accepted."""
     bad = failing(report)
-    return sorted((s for s in report.sources if s.pose), key=lambda s: (s not in bad, s.verdict != "agrees as accepted"))
+    return sorted(
+        (s for s in report.sources if s.pose), key=lambda s: (s not in bad, s.verdict is not Verdict.AGREES_AS_ACCEPTED)
+    )
 
 
 def colour(value: float) -> str:

@@ -8,6 +8,7 @@ from harness.report.document import PublishedResult, Report, Source
 from harness.report.regression import Regression
 from harness.report.source_parts import FrameResult
 from harness.report.text import metres, numbers, plain, radians, why, worsened
+from harness.report.verdicts import Verdict
 
 
 def render_junit(report: Report) -> str:
@@ -20,7 +21,7 @@ def render_junit(report: Report) -> str:
             suite.add_testcase(_not_run(report, source))
         for frame in source.frames:
             suite.add_testcase(_frame(report, source, frame))
-        if source.verdict in ("invalid placements", "keeps state"):
+        if source.verdict in (Verdict.INVALID_PLACEMENTS, Verdict.KEEPS_STATE):
             suite.add_testcase(_invalid(report, source))
     for claim in report.published:
         suite.add_testcase(_published(report, claim))

@@ -6,6 +6,7 @@ import re
 
 from harness.report.document import Report, Source
 from harness.report.text import changed_text, difference, for_all, metres, moved_text, numbers, plain, radians, why
+from harness.report.verdicts import Verdict
 
 _ENTITY = {"<": "&lt;", ">": "&gt;", "&": "&amp;"}
 MARK = {0: "PASS", 1: "FAIL", 3: "INCOMPLETE"}
@@ -63,7 +64,7 @@ def _disagreements(report: Report) -> list[str]:
         if r := source.reproducer:
             lines.append(f"  - {_md(r.frame)} at q = {_code(numbers(r.q))}: {metres(r.position)}, {radians(r.rotation)} off")
         lines += [f"  - {_md(text)}" for text in source.explained_by[:3]]
-    accepted = {f.accepted.reason: f for s in report.sources for f in s.frames if f.verdict == "accepted" and f.accepted}
+    accepted = {f.accepted.reason: f for s in report.sources for f in s.frames if f.verdict is Verdict.ACCEPTED and f.accepted}
     lines += [f"- accepted: {_md(reason)} ({metres(f.position.max)})" for reason, f in accepted.items()]
     return lines
 

@@ -8,6 +8,7 @@ from rich.text import Text
 
 from harness.report.document import Report, Source
 from harness.report.text import changed_text, for_all, metres, moved_text, numbers, plain, radians, why
+from harness.report.verdicts import Verdict
 
 _STYLE = {0: "bold green", 1: "bold red", 3: "bold yellow"}
 MAX_REASONS = 6
@@ -71,7 +72,7 @@ def _since(report: Report, console: Console) -> None:
 
 
 def _row(source: Source) -> tuple[Text, ...]:
-    verdict = Text(source.verdict, style="green" if source.passes else "yellow" if source.verdict == "not run" else "red")
+    verdict = Text(source.verdict, style="green" if source.passes else "yellow" if source.verdict is Verdict.NOT_RUN else "red")
     name = Text(plain(source.name))
     if not source.frames:
         install = f" ({source.install})" if source.install else ""

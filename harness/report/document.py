@@ -13,6 +13,9 @@ from harness.report.parts import Finite, Matrix, NonNegative, Part
 from harness.report.pose import Pose
 from harness.report.regression import Regression
 from harness.report.source_parts import Certificate, FrameResult, Reproducer, Tolerance, TraitNote, Validity
+from harness.report.verdicts import SourceVerdict
+
+WORDS = {0: "PASS", 1: "FAIL", 3: "INCOMPLETE"}
 
 
 class Source(Part):
@@ -26,9 +29,7 @@ class Source(Part):
     required: bool
     reference: bool = False
     status: Literal["ran", "not run", "failed"]
-    verdict: Literal[
-        "reference", "agrees", "agrees as accepted", "disagrees", "invalid placements", "keeps state", "not run", "failed"
-    ]
+    verdict: SourceVerdict
     reason: str = ""
     install: str = ""
     tolerance: Tolerance
@@ -54,7 +55,7 @@ class Source(Part):
     @property
     def passes(self) -> bool:
         """Whether its verdict is a good one."""
-        return self.verdict in ("reference", "agrees", "agrees as accepted")
+        return self.verdict.passes
 
     @property
     def worst(self) -> FrameResult:
@@ -146,12 +147,22 @@ class Settings(Part):
     command: str
 
 
-class Verdict(Part):
+class GateVerdict(Part):
     """The gate: 0 agreement, 1 disagreement, 3 a required source is missing or failed. `reasons` says why, one a line."""
 
     exit_code: Literal[0, 1, 3]
     sentence: str
     reasons: list[str] = []
+
+    @property
+    def passes(self) -> bool:
+        """Whether the robot passes the gate."""
+        return self.exit_code == 0
+
+    @property
+    def word(self) -> str:
+        """`PASS`, `FAIL` or `INCOMPLETE`: how every format begins."""
+        return WORDS[self.exit_code]
 
 
 class Environment(Part):
@@ -178,7 +189,7 @@ class Report(Part):
     version: Literal["1.3"] = "1.3"
     robot: Robot
     settings: Settings
-    verdict: Verdict
+    verdict: GateVerdict
     sources: list[Source]
     frames: list[Frame]
     unmapped: list[str] = []

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Literal
 
 from harness.report.parts import Configuration, Matrix, NonNegative, Part
+from harness.report.verdicts import FrameVerdict
 
 
 class At(Part):
@@ -52,9 +53,7 @@ class FrameResult(Part):
     """One source at one mapped frame, against the reference."""
 
     frame: str
-    verdict: Literal[
-        "agrees", "disagrees", "accepted", "deviation changed", "deviation vanished", "not compared", "not certified"
-    ]
+    verdict: FrameVerdict
     position: Statistics
     rotation: Statistics
     noise: str
@@ -63,7 +62,7 @@ class FrameResult(Part):
     @property
     def passes(self) -> bool:
         """Whether its verdict is a good one."""
-        return self.verdict in ("agrees", "accepted")
+        return self.verdict.passes
 
 
 class Reproducer(Part):

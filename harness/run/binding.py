@@ -5,39 +5,34 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from harness import se3
 from harness.comparison.components import View, components, mapped, matrices
 from harness.description.engine_names import placement_in_base
-from harness.description.frames import MappedFrame, unchecked_joint
-from harness.description.frames_file import EngineNames
+from harness.description.frames import unchecked_joint
 from harness.description.joints import JointMap
 from harness.description.model import RobotModel
 from harness.engines.base import Engine
-from harness.engines.registry import kind_of
-from harness.errors import EngineFailed, nearest
+from harness.errors import EngineFailed
+from harness.run.naming import Naming
 from harness.se3 import Array
 from harness.workers.process import ProcessEngine
-
-
-class Measured(NamedTuple):
-    """A measured offset T_dh_link (4, 4), and the largest entry by which it changes with q."""
-
-    offset: Array
-    spread: float
 
 
 @dataclass(kw_only=True)
 class Bound:
     """An engine bound to a model: asked in the model's joint order, answering at the mapped frames.
 
-    `frames` are the engine's frame names that are read; `view` tells how mapped frames follow from them; `missing` are
-    indices of mapped frames the engine does not have, though its description does; `absent` those it need not have, and
-    `undeclared` those of them that frames.toml does not say so of; `read_in` the frame its placements are read in, if not the
-    base frame; `waited` is the time spent on its answers.
+    engine: who answers.
+    joint_map: the model's joints as those of its description.
+    frames: the engine's frame names that are read.
+    view: how mapped frames follow from them.
+    missing: indices of mapped frames the engine does not have, though its description does.
+    absent: names of mapped frames it need not have.
+    undeclared: those of `absent` that frames.toml does not say so of.
+    read_in: the frame its placements are read in, if that is not the base frame.
+    waited: time spent on its answers [s].
     """
 
     engine: Engine
@@ -58,7 +53,7 @@ class Bound:
 
     def should_have(self, frame: int) -> bool:
         """Whether the mapped frame with this index can be expected of this source: its description has it."""
-        return self.view.slots[frame] >= 0 or frame in self.missing
+        return self.view.slots[frame] is not None or frame in self.missing
 
     def raw(self, q: Array) -> Array:
         """Placements as the engine returns them, q (N, n) in model order: (N, len(frames), 4, 4)."""
@@ -75,134 +70,83 @@ class Bound:
         return {frame: T[:, i] for i, frame in enumerate(self.view.available)}
 
 
-def wanted_frames(source: str, model: RobotModel) -> tuple[str, ...]:
-    """The engine's frames that binding it will read, as far as it has them."""
-    kind, names = kind_of(source), model.engine_names.get(source, EngineNames())
-    labels = [_label(f, kind, names) for f in model.frames.frames if f.name not in names.without]
-    return tuple(dict.fromkeys(label for label in labels if label is not None))
+@dataclass(frozen=True)
+class _Reading:
+    """Which raw frame is read for each mapped frame.
+
+    labels: the engine's name of each mapped frame, None where its description has none.
+    raw: the engine's frames that are read, each once.
+    """
+
+    labels: tuple[str | None, ...]
+    raw: tuple[str, ...]
+
+    @property
+    def slots(self) -> tuple[int | None, ...]:
+        """Index into `raw` of each mapped frame, None if it is not read."""
+        return tuple(self.raw.index(label) if label in self.raw else None for label in self.labels)
+
+    @property
+    def missing(self) -> tuple[int, ...]:
+        """Indices of mapped frames that have a label, and that the engine does not have."""
+        return tuple(i for i, label in enumerate(self.labels) if label is not None and label not in self.raw)
 
 
 def bind(engine: Engine, model: RobotModel, offsets: Mapping[str, Array]) -> Bound:
-    """Bind an engine to a model. `offsets` are the rigid offsets by frame name; an unmeasured one counts as none.
+    """Bind an engine to a model.
+
+    engine: who answers.
+    model: the robot model with its mapping.
+    offsets: the rigid offsets (4, 4) by frame name; one that is not measured counts as none.
 
     Raises EngineFailed for a frame or joint that is needed and not there, or there and unknown.
     """
-    kind, names = kind_of(engine.source), model.engine_names.get(engine.source, EngineNames())
-    joint_map = model.joint_map(kind).renamed(names.joints)
-    _check_joints(engine, joint_map)
-    frames = model.frames.frames
-    labels = {f.name: None if f.name in names.without else _label_there(f, kind, names, engine, model) for f in frames}
+    naming = Naming(model, engine.source)
+    naming.check_joints(engine)
     if isinstance(engine, ProcessEngine) and engine.is_program:
-        _check_frame_names(engine, kind, names, model)
-    read = [x for x in dict.fromkeys(labels.values()) if x is not None and x in engine.frames]
-    slots = tuple(read.index(x) if x in read else -1 for x in labels.values())
-    missing = tuple(i for i, x in enumerate(labels.values()) if x is not None and x not in read)
-    absent = [f.name for f in frames if f.name in names.without]
-    undeclared = [frames[i].name for i in missing] if engine.partial else []
+        naming.check_frames(engine)
+    reading = _reading(naming, engine)
+    names = [frame.name for frame in model.frames.frames]
+    absent = [name for name in names if name in naming.names.without]
+    undeclared = [names[i] for i in reading.missing] if engine.partial else []
     if engine.partial:
-        if joint := unchecked_joint((f for f, slot in zip(frames, slots, strict=True) if slot >= 0), model.table):
-            asked = ", ".join(dict.fromkeys(x for x in labels.values() if x is not None))
-            has = ", ".join(engine.frames)
-            raise EngineFailed(
-                engine.source, f"has none of the frames that joint {joint!r} moves: asked for {asked}; it has {has}"
-            )
-        absent += undeclared
-        missing = ()
-    constant = np.array([_constant(f, kind, names, offsets) for f in frames])
-    anchor = _anchor(engine, model, kind, names, labels)
-    view, read_in = View(slots, constant, None), ""
-    if anchor is not None:
-        T = placement_in_base(anchor, model.frames.base, model.table)
-        base = read.index(str(labels[anchor.name]))
-        view = View(slots, constant, base, None if np.array_equal(T, np.eye(4)) else T)
-        read_in = "" if anchor is model.frames.base else anchor.name
+        _check_chain(reading, engine, model)
+    view, read_in = _view(reading, naming, engine, offsets)
     return Bound(
         engine=engine,
-        joint_map=joint_map,
-        frames=tuple(read),
+        joint_map=naming.joint_map,
+        frames=reading.raw,
         view=view,
-        missing=missing,
-        absent=tuple(absent),
+        missing=() if engine.partial else reading.missing,
+        absent=(*absent, *undeclared),
         undeclared=tuple(undeclared),
         read_in=read_in,
     )
 
 
-def _label(frame: MappedFrame, kind: str, names: EngineNames) -> str | None:
-    """What an engine calls a mapped frame; None if its description does not have it."""
-    return names.frames.get(frame.name) or (frame.dh if kind == "dh" else frame.urdf)
+def _reading(naming: Naming, engine: Engine) -> _Reading:
+    """The labels of all mapped frames, and those that the engine has."""
+    labels = tuple(naming.label_in(engine, frame) for frame in naming.model.frames.frames)
+    return _Reading(labels, tuple(x for x in dict.fromkeys(labels) if x is not None and x in engine.frames))
 
 
-def _label_there(frame: MappedFrame, kind: str, names: EngineNames, engine: Engine, model: RobotModel) -> str | None:
-    """The label under which this engine has the frame: `base` and `0`, or `tool` and the last row, may be one frame."""
-    label = _label(frame, kind, names)
-    if kind == "urdf" or label in engine.frames or frame.name in names.frames:
-        return label
-    table = model.table
-    pairs = (("base", "0", table.base), ("tool", str(len(table.rows)), table.tool))
-    for one, other, T in pairs:
-        if label in (one, other) and np.array_equal(T, np.eye(4)):
-            return next((x for x in (one, other) if x in engine.frames), label)
-    return label
+def _check_chain(reading: _Reading, engine: Engine, model: RobotModel) -> None:
+    """Raise EngineFailed if an engine that lacks frames by design lacks all those that some joint moves."""
+    seen = (frame for frame, slot in zip(model.frames.frames, reading.slots, strict=True) if slot is not None)
+    if joint := unchecked_joint(seen, model.table):
+        asked = ", ".join(dict.fromkeys(x for x in reading.labels if x is not None))
+        has = ", ".join(engine.frames)
+        raise EngineFailed(engine.source, f"has none of the frames that joint {joint!r} moves: asked for {asked}; it has {has}")
 
 
-def _check_frame_names(engine: Engine, kind: str, names: EngineNames, model: RobotModel) -> None:
-    """A frame under a name that nothing has is a misspelling: it would go unread."""
-    known = {*names.frames.values(), *(model.table.frames if kind == "dh" or model.urdf is None else model.urdf.links)}
-    if unknown := [frame for frame in engine.frames if frame not in known]:
-        hint = f'another name can be given in frames.toml, [engine."{engine.source}"] frames'
-        raise EngineFailed(engine.source, f"has a frame {unknown[0]!r}: {nearest(unknown[0], known)}; {hint}")
-
-
-def _check_joints(engine: Engine, joint_map: JointMap) -> None:
-    if unknown := [j for j in engine.joints if j not in joint_map.names]:
-        hint = nearest(unknown[0], joint_map.names)
-        raise EngineFailed(engine.source, f"has a joint {unknown[0]!r} that the description does not: {hint}")
-    if lost := [j for j in joint_map.moved if j not in engine.joints and j not in joint_map.followers]:
-        raise EngineFailed(engine.source, f"has no joint {lost[0]!r}; {nearest(lost[0], engine.joints)}")
-
-
-def _anchor(
-    engine: Engine, model: RobotModel, kind: str, names: EngineNames, labels: Mapping[str, str | None]
-) -> MappedFrame | None:
-    """The frame relative to which placements are read; None if they are in the base frame as they come.
-
-    The one that frames.toml names; else, for a URDF, the base frame, or the first frame at a declared offset from it that
-    the engine has.
-    """
-    frames = model.frames.frames
-    if names.base is not None:
-        fit = [f for f in frames if f.name == names.base]
-    elif kind == "dh":
-        return None
-    else:
-        fit = [model.frames.base, *(f for f in frames if f.dh in ("base", "0") and f.offset is not None)]
-        fit = [f for f in fit if f.name not in names.without]
-    for frame in fit:
-        if labels[frame.name] in engine.frames:
-            return frame
-    raise EngineFailed(engine.source, f"has none of the frames that stand still: {', '.join(f.name for f in fit)}")
-
-
-def _constant(frame: MappedFrame, kind: str, names: EngineNames, offsets: Mapping[str, Array]) -> Array:
-    """Constant transform behind the frame that is read: a frame that is named as the engine has it needs none."""
-    if kind == "urdf" or frame.name in names.frames:
-        return np.eye(4)
-    return offsets.get(frame.name, np.eye(4)) if frame.offset is None else frame.offset
-
-
-def measure_rigid(model: RobotModel, in_house: Bound, urdf_source: Bound, q: Array) -> dict[str, Measured]:
-    """Offset of each rigid frame, by frame name: the mean of T_dh_link = T_base_dh^-1 T_base_link over q (N, n).
-
-    A mean over evenly spread configurations, not one of them: an offset taken at one absorbs whatever discrepancy there is
-    at that one, and shows it doubled elsewhere. Rotations are averaged in the chordal sense, by projecting the mean matrix
-    on SO(3) (Moakher 2002, doi:10.1137/S0895479801383877). Frames whose placements are not finite are left out.
-    """
-    T_base_dh, T_base_link = in_house.mapped(q), urdf_source.mapped(q)
-    offsets = {}
-    for i, frame in enumerate(model.frames.frames):
-        if frame.relation == "rigid" and i in T_base_link and np.isfinite(T_base_link[i]).all():
-            T_dh_link = se3.inverse(T_base_dh[i]) @ T_base_link[i]
-            mean = se3.mean_transform(T_dh_link)
-            offsets[frame.name] = Measured(mean, float(np.abs(T_dh_link - mean).max()))
-    return offsets
+def _view(reading: _Reading, naming: Naming, engine: Engine, offsets: Mapping[str, Array]) -> tuple[View, str]:
+    """How mapped frames follow from raw ones, and the name of the frame they are read in, if not the base frame."""
+    model = naming.model
+    constant = np.array([naming.constant(frame, dict(offsets)) for frame in model.frames.frames])
+    anchor = naming.anchor(engine)
+    if anchor is None:
+        return View(reading.slots, constant, None), ""
+    T_base_anchor = placement_in_base(anchor, model.frames.base, model.table)
+    base = reading.raw.index(str(naming.label_in(engine, anchor)))
+    view = View(reading.slots, constant, base, None if np.array_equal(T_base_anchor, np.eye(4)) else T_base_anchor)
+    return view, "" if anchor is model.frames.base else anchor.name

@@ -17,31 +17,28 @@ from harness.certificate.links import Link, SampledLinks, certify_links, sample_
 from harness.comparison.components import components, mapped
 from harness.description.model import RobotModel
 from harness.run.binding import Bound
-from harness.run.plan import Participant
-from harness.run.results import Certified, Results
+from harness.run.outcome import Certified, Outcome, Run
 from harness.se3 import Array
 from harness.workers.pool import Workers
 
 GRID_LIMIT = 4096
 
-Certify: TypeAlias = "Callable[[Participant], Certified]"
+Certify: TypeAlias = "Callable[[Outcome], Certified]"
 
 
-def certify_all(results: Results, workers: Workers) -> dict[str, Certified]:
-    """A certificate, or the reason why there is none, for every source that ran, by name."""
-    reference, *others = results.participants
-    running = [p for p in others if p.bound is not None]
-    if reference.bound is None or results.comparison is None:
-        return {}
+def certify_all(run: Run, workers: Workers) -> None:
+    """A certificate, or the reason why there is none, for every source that ran."""
     try:
-        axes = joint_axes(results.model)
+        axes = joint_axes(run.model)
         nodes = math.prod(axis.count for axis in axes)
         make = _by_grid if nodes <= GRID_LIMIT else _by_links
-        one = make(results, reference, axes)
-        tasks = {p.name: workers.submit(partial(_attempt, p, one)) for p in running}
-        return {name: task.result() for name, task in tasks.items()}
+        one = make(run, axes)
+        tasks = [(outcome, workers.submit(partial(_attempt, outcome, one))) for outcome in run.compared]
+        for outcome, task in tasks:
+            outcome.certified = task.result()
     except UncertifiableError as why:
-        return {p.name: Certified(reason=str(why)) for p in running}
+        for outcome in run.compared:
+            outcome.certified = Certified(reason=str(why))
 
 
 def _evaluate(bound: Bound) -> Evaluate:
@@ -68,39 +65,37 @@ class _Common:
         return cls(frames, [have_a.index(f) for f in frames], [have_b.index(f) for f in frames])
 
 
-def _starts(results: Results, name: str) -> list[Array]:
+def _starts(run: Run, source: str) -> list[Array]:
     """The worst configurations the run has seen for a source."""
-    if results.comparison is None:
-        return []
-    indices = {int(i) for part in (results.comparison.position, results.comparison.rotation) for i in part[name].argmax if i >= 0}
-    return [results.model.configurations.one(results.options.seed, i)[None, :] for i in sorted(indices)]
+    comparison = run.discrepancies()
+    indices = {int(i) for part in (comparison.position, comparison.rotation) for i in part[source].argmax if i >= 0}
+    return [run.model.configurations.one(run.options.seed, i)[None, :] for i in sorted(indices)]
 
 
-def _attempt(participant: Participant, work: Callable[[Participant], Certified]) -> Certified:
+def _attempt(outcome: Outcome, work: Certify) -> Certified:
     """An engine that raises while being certified gets no certificate; what it has shown before stands."""
     try:
-        return work(participant)
+        return work(outcome)
     except UncertifiableError as why:
         return Certified(reason=str(why))
     except Exception as error:  # an engine's failure is its result
-        return Certified(reason=f"{participant.name} raised {type(error).__name__}: {error}")
+        return Certified(reason=f"{outcome.name} raised {type(error).__name__}: {error}")
 
 
-def _by_grid(results: Results, reference: Participant, axes: list[Axis]) -> Certify:
-    nodes = grid(axes)
+def _by_grid(run: Run, axes: list[Axis]) -> Certify:
+    nodes, reference = grid(axes), run.reference
 
-    def sampled(participant: Participant) -> Sampled:
-        return sample(_evaluate(participant.running()), axes, np.random.default_rng(results.options.seed))
+    def sampled(outcome: Outcome) -> Sampled:
+        return sample(_evaluate(outcome.running()), axes, np.random.default_rng(run.options.seed))
 
     try:
         base = sampled(reference)
     except Exception as error:  # an engine's failure is its result
         raise UncertifiableError(f"{reference.name} raised {type(error).__name__}: {error}") from error
 
-    def one(participant: Participant) -> Certified:
-        own, common = sampled(participant), _Common.of(participant.running(), reference.running())
+    def one(outcome: Outcome) -> Certified:
+        own, common = sampled(outcome), _Common.of(outcome.running(), reference.running())
         known = Certified(
-            reason="",
             form="grid",
             nodes=len(nodes),
             residual=own.residual,
@@ -108,56 +103,52 @@ def _by_grid(results: Results, reference: Participant, axes: list[Axis]) -> Cert
             limit=own.limit,
             frames=common.frames,
         )
-        if reason := _refusal(own, base, participant.name, reference.name):
+        if reason := _refusal(own, base, outcome.name, reference.name):
             return replace(known, reason=reason)
         a, b = replace(own, values=own.values[:, common.rows_a]), replace(base, values=base.values[:, common.rows_b])
         D = a.values - b.values
         flat = np.concatenate([np.abs(D[:, :, 3]).sum(axis=-1), np.abs(D[:, :, :3]).sum(axis=(-2, -1))], axis=1)
-        starts = np.concatenate([nodes[sorted(set(flat.argmax(axis=0)))], *_starts(results, participant.name)])
+        starts = np.concatenate([nodes[sorted(set(flat.argmax(axis=0)))], *_starts(run, outcome.name)])
         bounds = certify(a, b, axes)
-        own_links, base_links, by_links = _link_bounds(results, participant, reference, axes, common)
+        own_links, base_links, by_links = _link_bounds(run, outcome, axes, common)
         if own_links.holds and base_links.holds:
             bounds = tighter(bounds, by_links)
-        return _with_found(
-            known, bounds, participant, reference, axes, starts,
-            lambda q: np.tensordot(weights(axes, q), D, axes=1),
-        )  # fmt: skip
+        pair = _Pair(outcome.running(), reference.running(), axes)
+        return _with_found(known, bounds, pair, starts, lambda q: np.tensordot(weights(axes, q), D, axes=1))
 
     return one
 
 
-def _by_links(results: Results, reference: Participant, axes: list[Axis]) -> Certify:
-    def one(participant: Participant) -> Certified:
-        common = _Common.of(participant.running(), reference.running())
-        own, base, bounds = _link_bounds(results, participant, reference, axes, common)
-        count = sum(len(value) for value in own.values)
+def _by_links(run: Run, axes: list[Axis]) -> Certify:
+    reference = run.reference
+
+    def one(outcome: Outcome) -> Certified:
+        common = _Common.of(outcome.running(), reference.running())
+        own, base, bounds = _link_bounds(run, outcome, axes, common)
         known = Certified(
-            reason="",
             form="links",
-            nodes=count,
+            nodes=sum(len(value) for value in own.values),
             residual=own.residual,
             reference_residual=base.residual,
             limit=own.limit,
             frames=common.frames,
         )
-        if reason := _refusal(own, base, participant.name, reference.name):
+        if reason := _refusal(own, base, outcome.name, reference.name):
             return replace(known, reason=reason)
-        starts = np.concatenate(_starts(results, participant.name))
-        return _with_found(known, bounds, participant, reference, axes, starts, None)
+        starts = np.concatenate(_starts(run, outcome.name))
+        return _with_found(known, bounds, _Pair(outcome.running(), reference.running(), axes), starts, None)
 
     return one
 
 
-def _link_bounds(
-    results: Results, participant: Participant, reference: Participant, axes: list[Axis], common: _Common
-) -> tuple[SampledLinks, SampledLinks, Bounds]:
+def _link_bounds(run: Run, outcome: Outcome, axes: list[Axis], common: _Common) -> tuple[SampledLinks, SampledLinks, Bounds]:
     """Both sources link by link, and the bounds that follow if the premise holds for both."""
-    links = chain_links(results.model, common.frames)
+    links = chain_links(run.model, common.frames)
     if any(math.prod(axes[j].count for j in link.joints) > GRID_LIMIT for link in links):
         raise UncertifiableError("too many joints between two mapped frames: map the frames between them")
     own, base = (
-        sample_links(_rows(_evaluate(p.running()), rows), axes, links, np.random.default_rng(results.options.seed))
-        for p, rows in ((participant, common.rows_a), (reference, common.rows_b))
+        sample_links(_rows(_evaluate(o.running()), rows), axes, links, np.random.default_rng(run.options.seed))
+        for o, rows in ((outcome, common.rows_a), (run.reference, common.rows_b))
     )
     return own, base, certify_links(own, base, axes, links, len(common.frames))
 
@@ -198,19 +189,24 @@ def _refusal(own: Sampled | SampledLinks, base: Sampled | SampledLinks, name: st
     return ""
 
 
-def _with_found(
-    known: Certified, bounds: Bounds, participant: Participant, reference: Participant, axes: list[Axis], starts: Array,
-    interpolant: Evaluate | None,
-) -> Certified:  # fmt: skip
+@dataclass(frozen=True)
+class _Pair:
+    """A source, the reference, and how both depend on each joint."""
+
+    source: Bound
+    reference: Bound
+    axes: list[Axis]
+
+    def difference(self, q: Array) -> Array:
+        """Source less reference at the frames both have, q (N, n): (N, F, 4, 3)."""
+        common = _Common.of(self.source, self.reference)
+        return np.asarray(_evaluate(self.source)(q)[:, common.rows_a] - _evaluate(self.reference)(q)[:, common.rows_b])
+
+
+def _with_found(known: Certified, bounds: Bounds, pair: _Pair, starts: Array, interpolant: Evaluate | None) -> Certified:
     """Add the bounds and the largest discrepancies found; a bound that is exceeded is no bound, and refused."""
-    common = _Common.of(participant.running(), reference.running())
-    a, b = _evaluate(participant.running()), _evaluate(reference.running())
-
-    def difference(q: Array) -> Array:
-        return np.asarray(a(q)[:, common.rows_a] - b(q)[:, common.rows_b])
-
-    floor = 2.0 * rounding_of(len(axes), 1.0)
-    position, rotation = found_from(difference, interpolant or difference, axes, starts, floor)
+    floor = 2.0 * rounding_of(len(pair.axes), 1.0)
+    position, rotation = found_from(pair.difference, interpolant or pair.difference, pair.axes, starts, floor)
     if not ((position <= bounds.position).all() and (rotation <= bounds.rotation).all()):  # also if one is no number
         return replace(known, reason="a discrepancy above the bound was found: the premise does not hold")
     return replace(known, bounds=bounds, position_found=position, rotation_found=rotation)

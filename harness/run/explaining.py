@@ -18,8 +18,7 @@ from harness.kinematics.descriptions import X_AXIS, Z_AXIS, Reading
 from harness.kinematics.recipes import Recipe, TableRecipe, UrdfRecipe
 from harness.kinematics.screws import finite_steps
 from harness.run.binding import Bound
-from harness.run.plan import pair_tolerance
-from harness.run.results import Explained, Results
+from harness.run.outcome import Explained, Run
 from harness.se3 import Array
 
 FITTED, CHECKED = 16, 48
@@ -115,30 +114,25 @@ def _faithful(
     return None
 
 
-def explain_all(results: Results) -> dict[str, Explained]:
+def explain_all(run: Run) -> None:
     """Why each source that is outside tolerance is; those that show the same as one before share its explanation."""
-    reference, comparison = results.participants[0], results.comparison
-    if reference.bound is None or comparison is None:
-        return {}
-    found: dict[str, Explained] = {}
     solved: list[tuple[Problem, Explained]] = []
-    every = range(len(results.model.frames.frames))
-    for participant in results.participants[1:]:
-        tolerance = pair_tolerance(participant.planned, reference.planned)
-        if participant.bound is None or comparison.worst(participant.name, tolerance, every) is None:
+    every = range(len(run.model.frames.frames))
+    for outcome in run.compared:
+        tolerance = run.tolerance(outcome)
+        if run.discrepancies().worst(outcome.name, tolerance, every) is None:
             continue
         try:
-            problem = problem_of(results.model, results.offsets, reference.bound, participant.bound, tolerance)
+            problem = problem_of(run.model, run.rigid_transforms, run.reference.running(), outcome.running(), tolerance)
         except Exception as error:  # an engine's failure is its result; the comparison stands without its cause
-            found[participant.name] = Explained(unexplained=f"{participant.name} failed: {type(error).__name__}: {error}")
+            outcome.explained = Explained(unexplained=f"{outcome.name} failed: {type(error).__name__}: {error}")
             continue
         shared = (_of_another(known, one, problem) for one, known in solved)
         mine = next((known for known in shared if known is not None), None)
         if mine is None:
-            mine = told(problem, results.model)
+            mine = told(problem, run.model)
             solved.append((problem, mine))
-        found[participant.name] = mine
-    return found
+        outcome.explained = mine
 
 
 def told(problem: Problem, model: RobotModel) -> Explained:

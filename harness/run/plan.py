@@ -1,4 +1,4 @@
-"""Which sources take part in a run, how far each may be off, and what became of it."""
+"""Which sources take part in a run, and how far each may be off."""
 
 from __future__ import annotations
 
@@ -8,55 +8,29 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Literal, TypeAlias
 
 from harness.description.model import RobotModel, Tolerance
 from harness.engines.registry import REFERENCE, adapter_of, kind_of, registered
-from harness.errors import EngineFailed, EngineUnavailable, InputError, MappingError, nearest
-from harness.run.binding import Bound
+from harness.errors import EngineUnavailable, InputError, MappingError, nearest
 from harness.run.options import Options
-
-Status: TypeAlias = Literal["ran", "not run", "failed"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Planned:
-    """A source that is to run: an engine, or a command of the user's that speaks the worker protocol, run in `folder`."""
+    """A source that is to run: an engine, or a program of the user's.
+
+    name: source name.
+    required: whether the gate fails without it.
+    tolerance: how far it may be off, against the in-house FK.
+    command: the program, which speaks the worker protocol; empty for an engine.
+    folder: where the program is started; None for one given with --worker.
+    """
 
     name: str
     required: bool
     tolerance: Tolerance
     command: tuple[str, ...] = ()
     folder: Path | None = None
-
-
-@dataclass(kw_only=True)
-class Participant:
-    """A planned source and what became of it. `bound` is None unless it runs."""
-
-    planned: Planned
-    bound: Bound | None = None
-    status: Status = "ran"
-    reason: str = ""
-    install: str = ""
-
-    @property
-    def name(self) -> str:
-        """Source name."""
-        return self.planned.name
-
-    def running(self) -> Bound:
-        """Its engine. Raises RuntimeError if it does not run."""
-        if self.bound is None:
-            raise RuntimeError(f"{self.name} is not bound")
-        return self.bound
-
-    def fail(self, error: Exception) -> None:
-        """Take the source out and keep why. What third-party code raises is its result, not the end of the run."""
-        self.bound = None
-        self.status = "not run" if isinstance(error, EngineUnavailable) else "failed"
-        self.reason = error.reason if isinstance(error, EngineUnavailable | EngineFailed) else f"{type(error).__name__}: {error}"
-        self.install = (error.install or "") if isinstance(error, EngineUnavailable) else ""
 
 
 def plan(model: RobotModel, options: Options) -> list[Planned]:

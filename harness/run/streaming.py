@@ -10,8 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from harness.comparison.compare import Comparison
-from harness.run.plan import Participant
-from harness.run.results import Results
+from harness.run.outcome import Outcome, Run
 from harness.se3 import Array
 from harness.workers.pool import Workers
 from harness.workers.protocol import MAX_BLOCK
@@ -24,47 +23,46 @@ Answers: TypeAlias = "dict[str, Array]"
 Handed: TypeAlias = "tuple[int, int, dict[str, Future[Array]]]"
 
 
-def compare(results: Results, workers: Workers, progress: Progress | None) -> Comparison | None:
+def compare(run: Run, workers: Workers, progress: Progress | None) -> Comparison | None:
     """Compare all sources at all configurations. None if the reference is out."""
-    configurations, options = results.model.configurations, results.options
-    fixed = len(configurations.fixed)
-    total = fixed + options.samples
-    reference = results.participants[0]
-    live = {p.name: p for p in results.participants if p.bound is not None}
+    fixed = len(run.model.configurations.fixed)
+    total = fixed + run.options.samples
+    reference = run.reference.name
+    live = {o.name: o for o in run.outcomes if o.bound is not None}
     comparison = Comparison(
-        {name: p.bound.view for name, p in live.items() if p.bound is not None},
-        reference.name,
-        len(results.model.frames.frames),
-        fixed + min(SUBSET, options.samples),
+        {name: outcome.running().view for name, outcome in live.items()},
+        reference,
+        len(run.model.frames.frames),
+        fixed + min(SUBSET, run.options.samples),
     )
     last: Answers = {}
-    handed = _hand_out(results, workers, live, 0, total)
+    handed = _hand_out(run, workers, live, 0, total)
     while handed is not None:
         start, stop, tasks = handed
         raw = _collect(tasks, live, comparison, f"(configurations {start} to {stop - 1})")
-        if reference.name not in live:
+        if reference not in live:
             return None
-        handed = _hand_out(results, workers, live, stop, total)  # before comparing: the engines need not wait for that
+        handed = _hand_out(run, workers, live, stop, total)  # before comparing: the engines need not wait for that
         comparison.update(start, raw)
         last = {name: T[-1].copy() for name, T in raw.items()}
         if progress:
             progress(stop, total)
-    _ask_again(results, workers, comparison, live, last, total - 1)
-    return comparison if reference.name in live else None
+    _ask_again(run, workers, comparison, live, last)
+    return comparison if reference in live else None
 
 
-def _hand_out(results: Results, workers: Workers, live: dict[str, Participant], start: int, total: int) -> Handed | None:
+def _hand_out(run: Run, workers: Workers, live: dict[str, Outcome], start: int, total: int) -> Handed | None:
     """Give the next block to every source still there, the slowest first: what begins last decides when all are done."""
     if start >= total:
         return None
     stop = min(start + BLOCK, total)
-    q = results.model.configurations.block(results.options.seed, start, stop)
+    q = run.model.configurations.block(run.options.seed, start, stop)
     order = sorted(live, key=lambda name: -live[name].running().seconds)
     tasks = {name: workers.submit(partial(live[name].running().raw, q)) for name in order}
     return start, stop, {name: tasks[name] for name in live}
 
 
-def _collect(tasks: dict[str, Future[Array]], live: dict[str, Participant], comparison: Comparison, where: str) -> Answers:
+def _collect(tasks: dict[str, Future[Array]], live: dict[str, Outcome], comparison: Comparison, where: str) -> Answers:
     """The answers; a source that has none is taken out, with the block it was given."""
     raw: Answers = {}
     for name, task in tasks.items():
@@ -78,21 +76,20 @@ def _collect(tasks: dict[str, Future[Array]], live: dict[str, Participant], comp
     return raw
 
 
-def _ask_again(
-    results: Results, workers: Workers, comparison: Comparison, live: dict[str, Participant], last: Answers, index: int
-) -> None:
+def _ask_again(run: Run, workers: Workers, comparison: Comparison, live: dict[str, Outcome], last: Answers) -> None:
     """Ask for the first and the last configuration again, alone and in the other order: an engine that keeps state differs."""
     if not last:
         return
-    configurations, seed = results.model.configurations, results.options.seed
+    configurations, seed = run.model.configurations, run.options.seed
+    index = len(configurations.fixed) + run.options.samples - 1
     first, final = (configurations.one(seed, i)[None, :] for i in (0, index))
 
-    def again(participant: Participant) -> Array:
-        participant.running().raw(first)
-        answer: Array = participant.running().raw(final)[0]
+    def again(outcome: Outcome) -> Array:
+        outcome.running().raw(first)
+        answer: Array = outcome.running().raw(final)[0]
         return answer
 
-    tasks = {name: workers.submit(partial(again, participant)) for name, participant in live.items()}
+    tasks = {name: workers.submit(partial(again, outcome)) for name, outcome in live.items()}
     for name, T in _collect(tasks, live, comparison, f"(configuration {index}, asked for again)").items():
         with np.errstate(invalid="ignore"):
             difference = np.abs(T - last[name])

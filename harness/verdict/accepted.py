@@ -8,17 +8,17 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Protocol
 
 from pydantic import ValidationError
 
 from harness.errors import InputError
-from harness.report.document import PublishedResult, Report, Source
+from harness.report.document import GateVerdict, PublishedResult, Report, Robot, Settings, Source
 from harness.report.parts import NonNegative, Part
 from harness.report.regression import Changed, Moved, Quantity, Regression
-from harness.report.text import worsened
 
 FOLDER = "accepted"
+GATE = {0: "passes", 1: "fails", 3: "incomplete"}  # how the file calls the verdict
 Pair = tuple[NonNegative, NonNegative]  # position [m], rotation [rad]
 BOUND = 50.0  # times the noise floor: a bound multiplies rounding by the Lebesgue constant of its grid, about 20 for six joints
 SEEN: tuple[Quantity, Quantity] = ("position", "rotation")
@@ -55,6 +55,30 @@ class AcceptedNumbers(Part):
     inputs: dict[str, str]
     published: dict[str, str]
     sources: dict[str, AcceptedSource]
+
+
+class Judged(Protocol):
+    """What the numbers on file are compared with: a report, or what is about to become one."""
+
+    @property
+    def robot(self) -> Robot:
+        """The robot model."""
+
+    @property
+    def settings(self) -> Settings:
+        """What was asked."""
+
+    @property
+    def sources(self) -> list[Source]:
+        """Every source."""
+
+    @property
+    def published(self) -> list[PublishedResult]:
+        """Every published placement."""
+
+    @property
+    def verdict(self) -> GateVerdict:
+        """The verdict of the gate."""
 
 
 def accepted_from(report: Report) -> AcceptedNumbers:
@@ -97,8 +121,8 @@ def read_accepted(path: Path) -> AcceptedNumbers:
         raise InputError(f"no accepted numbers: {first['msg']}", where=path, key=key or None) from None
 
 
-def since(numbers: AcceptedNumbers, report: Report, strict: bool) -> Regression:
-    """What moved from the numbers on file to this report."""
+def since(numbers: AcceptedNumbers, report: Judged, strict: bool) -> Regression:
+    """What moved from the numbers on file to this report; strict: what grew fails."""
     now, before = _settings(report), numbers.settings
     # Random configurations are numbered: with fewer of them the first ones are looked at again, and what grows there has grown.
     fewer = now.samples < before.samples
@@ -114,27 +138,11 @@ def since(numbers: AcceptedNumbers, report: Report, strict: bool) -> Regression:
     )
 
 
-def compared(report: Report, numbers: AcceptedNumbers, strict: bool) -> Report:
-    """The report with what moved since; strict: it fails if anything did for the worse."""
-    found = since(numbers, report, strict)
-    report = report.model_copy(update={"regression": found})
-    if not strict or not found.worse:
-        return report
-    reasons = worsened(found)
-    old = report.verdict
-    if old.exit_code == 1:
-        update: dict[str, object] = {"reasons": [*old.reasons, *reasons]}
-    else:
-        sentence = f"{report.robot.name} MOVED since it was accepted: {reasons[0]}"
-        update = {"exit_code": 1, "sentence": sentence, "reasons": [*reasons, *old.reasons]}
-    return report.model_copy(update={"verdict": old.model_copy(update=update)})
+def _gate(report: Judged) -> str:
+    return GATE[report.verdict.exit_code]
 
 
-def _gate(report: Report) -> str:
-    return {0: "passes", 1: "fails", 3: "incomplete"}[report.verdict.exit_code]
-
-
-def _settings(report: Report) -> Conditions:
+def _settings(report: Judged) -> Conditions:
     s = report.settings
     return Conditions(reference=s.reference, fixed=s.fixed, samples=s.samples, seed=s.seed)
 
@@ -157,7 +165,7 @@ def _kept(x: float, floor: float) -> float:
     return 0.0 if x <= floor else float(f"{x:.10g}")
 
 
-def _moved(numbers: AcceptedNumbers, report: Report) -> Iterator[Moved]:
+def _moved(numbers: AcceptedNumbers, report: Judged) -> Iterator[Moved]:
     for source in report.sources:
         known = numbers.sources.get(source.name)
         if known is None:
@@ -173,9 +181,9 @@ def _moved(numbers: AcceptedNumbers, report: Report) -> Iterator[Moved]:
                         yield Moved(source=source.name, frame=frame, quantity=what, unit=unit, before=a, after=b, floor=floor)
 
 
-def _changed(numbers: AcceptedNumbers, report: Report) -> Iterator[Changed]:
+def _changed(numbers: AcceptedNumbers, report: Judged) -> Iterator[Changed]:
     if numbers.verdict != (gate := _gate(report)):
-        yield Changed(what="the gate", before=numbers.verdict, after=gate, worse=gate != "passes")
+        yield Changed(what="the gate", before=numbers.verdict, after=gate, worse=not report.verdict.passes)
     for name, digest in report.robot.hashes.items():
         if (before := numbers.inputs.get(name, "not there")) != digest:
             yield Changed(what=name, before=before[:12], after=digest[:12])
@@ -189,7 +197,7 @@ def _changed(numbers: AcceptedNumbers, report: Report) -> Iterator[Changed]:
             yield Changed(what=f"published placement {text}", before=found, after=claims[text].found, worse=worse)
 
 
-def _sources_changed(numbers: AcceptedNumbers, report: Report) -> Iterator[Changed]:
+def _sources_changed(numbers: AcceptedNumbers, report: Judged) -> Iterator[Changed]:
     now = {s.name: s for s in report.sources if not s.reference}
     for name, source in now.items():
         known = numbers.sources.get(name)

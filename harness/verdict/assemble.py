@@ -3,46 +3,67 @@
 from __future__ import annotations
 
 import platform
+from dataclasses import dataclass
 from datetime import datetime, timezone
 
 from harness import __version__, se3
 from harness.description.configurations import Configuration
 from harness.description.published import Published
 from harness.report import document as doc
-from harness.run.results import Results
-from harness.verdict.gate import verdict
+from harness.run.outcome import Run
+from harness.verdict.accepted import AcceptedNumbers, since
+from harness.verdict.gate import gate, held_to
 from harness.verdict.judge import check_claim
 from harness.verdict.model_part import side_by_side, trees
 from harness.verdict.source_part import assemble_source
 
 
-def assemble(results: Results) -> doc.Report:
-    """The report of a finished run."""
-    sources = [assemble_source(results, participant) for participant in results.participants]
-    published = [
-        _published(results, configuration, claim)
-        for configuration in results.model.configurations.fixed
-        for claim in configuration.published
-    ]
-    settings = _settings(results)
+@dataclass(frozen=True, kw_only=True)
+class _Judged:
+    """A report but for what moved since its numbers were accepted, and the final verdict."""
+
+    robot: doc.Robot
+    settings: doc.Settings
+    sources: list[doc.Source]
+    published: list[doc.PublishedResult]
+    verdict: doc.GateVerdict
+
+
+def assemble(run: Run, accepted: AcceptedNumbers | None = None) -> doc.Report:
+    """The report of a finished run; accepted: the numbers on file, if it is to say what moved since."""
+    judged = _judged(run)
+    regression = None if accepted is None else since(accepted, judged, run.options.strict)
     return doc.Report(
-        robot=_robot(results),
-        settings=settings,
-        verdict=verdict(results.model.name, sources, published, settings),
-        sources=sources,
-        frames=_frames(results),
-        unmapped=_unmapped(results),
-        trees=trees(results.model),
-        parameters=side_by_side(results),
-        pairs=_pairs(results),
-        published=published,
-        lint=_lint(results),
-        environment=_environment(results),
+        robot=judged.robot,
+        settings=judged.settings,
+        verdict=held_to(judged.verdict, run.model.name, regression),
+        sources=judged.sources,
+        frames=_frames(run),
+        unmapped=_unmapped(run),
+        trees=trees(run.model),
+        parameters=side_by_side(run),
+        pairs=_pairs(run),
+        published=judged.published,
+        lint=_lint(run),
+        regression=regression,
+        environment=_environment(run),
     )
 
 
-def _robot(results: Results) -> doc.Robot:
-    model = results.model
+def _judged(run: Run) -> _Judged:
+    sources = [assemble_source(run, outcome) for outcome in run.outcomes]
+    published = [
+        _published(run, configuration, claim)
+        for configuration in run.model.configurations.fixed
+        for claim in configuration.published
+    ]
+    settings = _settings(run)
+    verdict = gate(run.model.name, sources, published, settings)
+    return _Judged(robot=_robot(run), settings=settings, sources=sources, published=published, verdict=verdict)
+
+
+def _robot(run: Run) -> doc.Robot:
+    model = run.model
     provenance = {k: v for k, v in model.file.provenance.model_dump().items() if v}
     return doc.Robot(
         name=model.name,
@@ -53,32 +74,33 @@ def _robot(results: Results) -> doc.Robot:
         joints=list(model.table.joints),
         lower=model.configurations.lower.tolist(),
         upper=model.configurations.upper.tolist(),
-        reach=results.comparison.reach if results.comparison else 0.0,
+        reach=run.comparison.reach if run.comparison else 0.0,
         hashes=dict(model.hashes),
     )
 
 
-def _settings(results: Results) -> doc.Settings:
-    options = results.options
-    fixed = len(results.model.configurations.fixed)
+def _settings(run: Run) -> doc.Settings:
+    options = run.options
+    fixed = len(run.model.configurations.fixed)
     return doc.Settings(
-        reference=results.participants[0].name,
-        sources=[p.name for p in results.participants],
-        gate=results.model.file.gate,
+        reference=run.reference.name,
+        sources=[p.name for p in run.outcomes],
+        gate=run.model.file.gate,
         certify=options.certify,
-        not_chosen=[s.name for s in results.model.file.source if s.name not in {p.name for p in results.participants}],
+        not_chosen=[s.name for s in run.model.file.source if s.name not in {p.name for p in run.outcomes}],
         fixed=fixed,
         samples=options.samples,
         seed=options.seed,
-        subset=results.comparison.subset if results.comparison else 0,
+        subset=run.comparison.subset if run.comparison else 0,
         command=options.command,
     )
 
 
-def _frames(results: Results) -> list[doc.Frame]:
+def _frames(run: Run) -> list[doc.Frame]:
     frames = []
-    for frame in results.model.frames.frames:
-        offset = results.offsets.get(frame.name) if frame.offset is None else frame.offset
+    for frame in run.model.frames.frames:
+        measured = run.offsets.get(frame.name)
+        offset = (measured.T_dh_frame if measured else None) if frame.offset is None else frame.offset
         frames.append(
             doc.Frame(
                 name=frame.name,
@@ -87,21 +109,21 @@ def _frames(results: Results) -> list[doc.Frame]:
                 relation=frame.relation,
                 of=frame.of,
                 offset=None if offset is None else offset.tolist(),
-                measured_from=results.measured_from.get(frame.name, ""),
+                measured_from=measured.measured_from if measured else "",
             )
         )
     return frames
 
 
-def _unmapped(results: Results) -> list[str]:
-    labels, links = results.model.unmapped()
+def _unmapped(run: Run) -> list[str]:
+    labels, links = run.model.unmapped()
     return [f"DH frame {label}" for label in labels] + [f"link {link}" for link in links]
 
 
-def _pairs(results: Results) -> list[doc.PairResult]:
-    if results.comparison is None:
+def _pairs(run: Run) -> list[doc.PairResult]:
+    if run.comparison is None:
         return []
-    names = [frame.name for frame in results.model.frames.frames]
+    names = [frame.name for frame in run.model.frames.frames]
     return [
         doc.PairResult(
             a=a,
@@ -111,15 +133,13 @@ def _pairs(results: Results) -> list[doc.PairResult]:
             rotation=pair.rotation,
             rotation_frame=names[pair.rotation_frame],
         )
-        for (a, b), pair in results.comparison.pairs.items()
+        for (a, b), pair in run.comparison.pairs.items()
     ]
 
 
-def _published(results: Results, configuration: Configuration, claim: Published) -> doc.PublishedResult:
+def _published(run: Run, configuration: Configuration, claim: Published) -> doc.PublishedResult:
     """Check a claim against the in-house FK, whatever the reference of the run is."""
-    if results.in_house is None:
-        raise RuntimeError("published placements need the in-house FK")
-    T_base_a, T_base_b = results.in_house.engine.placements(configuration.q[None, :], (claim.relative_to, claim.dh))[0]
+    T_base_a, T_base_b = run.in_house.engine.placements(configuration.q[None, :], (claim.relative_to, claim.dh))[0]
     T_a_b = se3.inverse(T_base_a) @ T_base_b
     check = check_claim(claim, T_a_b)
     return doc.PublishedResult(
@@ -141,28 +161,28 @@ def _published(results: Results, configuration: Configuration, claim: Published)
     )
 
 
-def _lint(results: Results) -> list[doc.Lint]:
+def _lint(run: Run) -> list[doc.Lint]:
     found = [
         doc.Lint(code=f.code, level=f.level, subject=f.subject, message=f"URDF line {f.line}: {f.message}")
-        for f in results.model.findings
+        for f in run.model.findings
     ]
     found += [
         doc.Lint(code="suspect-number", level="warning", subject=s.where, message=f"{s.where}: {s.why}")
-        for s in results.model.suspects
+        for s in run.model.suspects
     ]
     return found
 
 
-def _environment(results: Results) -> doc.Environment:
+def _environment(run: Run) -> doc.Environment:
     versions: dict[str, dict[str, str]] = {}
-    for participant in results.participants:
-        versions[participant.name] = participant.bound.engine.installed() if participant.bound else {}
+    for outcome in run.outcomes:
+        versions[outcome.name] = outcome.bound.engine.installed() if outcome.bound else {}
     return doc.Environment(
         created=datetime.now(timezone.utc).isoformat(timespec="seconds"),
-        duration=results.seconds,
-        loading=results.loaded_in,
-        waiting_seconds={p.name: p.bound.waited for p in results.participants if p.bound is not None},
-        engine_seconds={p.name: p.bound.seconds for p in results.participants if p.bound is not None},
+        duration=run.seconds,
+        loading=run.loaded_in,
+        waiting_seconds={p.name: p.bound.waited for p in run.outcomes if p.bound is not None},
+        engine_seconds={p.name: p.bound.seconds for p in run.outcomes if p.bound is not None},
         versions=versions,
         harness=__version__,
         python=platform.python_version(),

@@ -10,7 +10,7 @@ from harness.description.configurations import ConfigurationSet
 from harness.report import explanation as reasons
 from harness.report import source_parts as parts
 from harness.report.pose import FramePair, Pose
-from harness.run.results import Explained, Results
+from harness.run.outcome import Explained, Outcome, Run
 
 
 def at(configurations: ConfigurationSet, index: int, seed: int) -> parts.At:
@@ -18,9 +18,9 @@ def at(configurations: ConfigurationSet, index: int, seed: int) -> parts.At:
     return parts.At(index=index, label=configurations.label(index), q=configurations.one(seed, index).tolist())
 
 
-def certificate(results: Results, source: str) -> parts.Certificate | None:
+def certificate(run: Run, outcome: Outcome) -> parts.Certificate | None:
     """The report entry of a source's certificate."""
-    certified = results.certified.get(source)
+    certified = outcome.certified
     if certified is None:
         return None
     bounds, position, rotation = certified.bounds, certified.position_found, certified.rotation_found
@@ -28,7 +28,7 @@ def certificate(results: Results, source: str) -> parts.Certificate | None:
     if bounds is not None and position is not None and rotation is not None:
         frames = [
             parts.FrameBound(
-                frame=results.model.frames.frames[index].name,
+                frame=run.model.frames.frames[index].name,
                 position_upper=float(bounds.position[i]),
                 position_found=float(position[i]),
                 rotation_upper=float(bounds.rotation[i]),
@@ -75,13 +75,13 @@ def explanation(explained: Explained | None) -> reasons.Explanation | None:
     )
 
 
-def reproducer(results: Results, source: str) -> parts.Reproducer | None:
+def reproducer(run: Run, outcome: Outcome) -> parts.Reproducer | None:
     """The report entry of the smallest reproducer."""
-    found = results.reproduced.get(source)
+    found = outcome.reproduced
     if found is None:
         return None
     return parts.Reproducer(
-        frame=results.model.frames.frames[found.frame].name,
+        frame=run.model.frames.frames[found.frame].name,
         q=found.q.tolist(),
         position=found.position,
         rotation=found.rotation,
@@ -90,12 +90,12 @@ def reproducer(results: Results, source: str) -> parts.Reproducer | None:
     )
 
 
-def pose(results: Results, source: str) -> Pose | None:
+def pose(run: Run, outcome: Outcome) -> Pose | None:
     """The report entry of both sides at the worst configuration."""
-    found = results.posed.get(source)
+    found = outcome.worst
     if found is None:
         return None
-    frames = results.model.frames.frames
+    frames = run.model.frames.frames
     pairs = [FramePair(frame=frames[i].name, reference=a.tolist(), source=b.tolist()) for i, (a, b) in found.placements.items()]
-    where = at(results.model.configurations, found.index, results.options.seed)
+    where = at(run.model.configurations, found.index, run.options.seed)
     return Pose(at=where, frame=frames[found.frame].name, frames=pairs)

@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
+from harness.errors import ExitCode
 from harness.report import document as doc
-from harness.report.text import metres, radians
+from harness.report.regression import Regression
+from harness.report.text import metres, radians, worsened
+from harness.report.verdicts import Verdict
 
-FAILING = ("disagrees", "invalid placements", "keeps state")
+
+def combined(codes: Iterable[int]) -> int:
+    """The exit code of several robots. If several apply, the smallest code above 0 wins: a missing source never hides a
+    disagreement."""
+    return min((code for code in codes if code), default=int(ExitCode.AGREES))
 
 
-def verdict(robot: str, sources: list[doc.Source], published: list[doc.PublishedResult], settings: doc.Settings) -> doc.Verdict:
-    """The gate. A disagreement found (1) stays found even if a required source is missing (3)."""
+def gate(
+    robot: str, sources: Sequence[doc.Source], published: Sequence[doc.PublishedResult], settings: doc.Settings
+) -> doc.GateVerdict:
+    """The verdict on a robot. A missing required source never hides a disagreement."""
     wrong, missing = [], []
     for source in sources:
-        if source.verdict in FAILING:
+        if source.verdict.disagrees:
             wrong.append(f"{source.name}: {describe(source)}")
         elif source.status != "ran" and source.required:
             install = f" ({source.install})" if source.install else ""
@@ -23,22 +34,33 @@ def verdict(robot: str, sources: list[doc.Source], published: list[doc.Published
     if not compared and not missing and not wrong:
         missing.append("no source was compared: " + "; ".join(f"{s.name} {s.status}" for s in sources))
     if wrong:
-        others = [s.name for s in sources if s.verdict in FAILING][1:]
+        others = [s.name for s in sources if s.verdict.disagrees][1:]
         sentence = f"{robot} DISAGREES: {wrong[0]}" + (f"; likewise {', '.join(others)}" if others else "")
-        return doc.Verdict(exit_code=1, sentence=sentence, reasons=wrong + missing)
+        return doc.GateVerdict(exit_code=1, sentence=sentence, reasons=wrong + missing)
     if missing:
-        return doc.Verdict(exit_code=3, sentence=f"{robot} IS NOT VERIFIED: {missing[0]}", reasons=missing)
-    accepted = sum(f.verdict == "accepted" for s in sources for f in s.frames)
+        return doc.GateVerdict(exit_code=3, sentence=f"{robot} IS NOT VERIFIED: {missing[0]}", reasons=missing)
+    accepted = sum(f.verdict is Verdict.ACCEPTED for s in sources for f in s.frames)
     count = f"{len(compared)} source{'s' if len(compared) > 1 else ''}"
     sentence = f"{robot} AGREES: {count} within tolerance of the reference at {settings.fixed + settings.samples} configurations"
     if accepted:
         sentence += f", {accepted} deviations as accepted"
     sentence += _for_all(compared)
     sentence += _asides(sources, settings)
-    return doc.Verdict(exit_code=0, sentence=sentence)
+    return doc.GateVerdict(exit_code=0, sentence=sentence)
 
 
-def _asides(sources: list[doc.Source], settings: doc.Settings) -> str:
+def held_to(verdict: doc.GateVerdict, robot: str, moved: Regression | None) -> doc.GateVerdict:
+    """The verdict of a strict run: it fails also if anything moved for the worse since the numbers were accepted."""
+    if moved is None or not moved.strict or not moved.worse:
+        return verdict
+    reasons = worsened(moved)
+    if verdict.exit_code == 1:
+        return doc.GateVerdict(exit_code=1, sentence=verdict.sentence, reasons=[*verdict.reasons, *reasons])
+    sentence = f"{robot} MOVED since it was accepted: {reasons[0]}"
+    return doc.GateVerdict(exit_code=1, sentence=sentence, reasons=[*reasons, *verdict.reasons])
+
+
+def _asides(sources: Sequence[doc.Source], settings: doc.Settings) -> str:
     """What was not compared, so that nobody takes it for agreement."""
     text = ""
     for status in ("not run", "failed"):
@@ -57,11 +79,11 @@ def _for_all(compared: list[doc.Source]) -> str:
         for s in compared
         if s.certificate
         for bound in s.certificate.frames
-        if next(f for f in s.frames if f.frame == bound.frame).verdict == "agrees"
+        if next(f for f in s.frames if f.frame == bound.frame).verdict is Verdict.AGREES
     ]
     if not frames or not all(s.certificate and s.certificate.status == "certified" for s in compared):
         return ""
-    aside = " (accepted deviations aside)" if any(f.verdict == "accepted" for s in compared for f in s.frames) else ""
+    aside = " (accepted deviations aside)" if any(f.verdict is Verdict.ACCEPTED for s in compared for f in s.frames) else ""
     return f"; for all configurations at most {metres(max(p for p, _ in frames))}, {radians(max(r for _, r in frames))}{aside}"
 
 
@@ -77,33 +99,33 @@ def _misfiled(claims: list[doc.PublishedResult]) -> str:
 
 def describe(source: doc.Source) -> str:
     """Where and by how much a source is off, in one clause."""
-    if source.verdict == "invalid placements" and source.validity is not None and source.validity.first is not None:
+    if source.verdict is Verdict.INVALID_PLACEMENTS and source.validity is not None and source.validity.first is not None:
         v = source.validity
         return (
             f"{v.invalid} of {v.checked} placements are not rigid transforms (residual {v.residual:.2g}), "
             f"first {v.first_frame} at {v.first.label if v.first else ''}"
         )
-    if source.verdict == "keeps state" and source.validity is not None and source.validity.again_at is not None:
+    if source.verdict is Verdict.KEEPS_STATE and source.validity is not None and source.validity.again_at is not None:
         v, at = source.validity, source.validity.again_at
         return f"its answer for {at.label} changed by {v.again:.2g} when asked again: it depends on what was asked before"
     worst = source.worst
     failing = [f for f in source.frames if not f.passes]
     if worst.passes:
         worst = failing[0]
-    if worst.verdict == "not certified":
+    if worst.verdict is Verdict.NOT_CERTIFIED:
         why = source.certificate.reason if source.certificate else "no certificate was made"
         bound = next((b for b in source.certificate.frames if b.frame == worst.frame), None) if source.certificate else None
         if bound is not None:
             why = f"only {metres(bound.position_upper)}, {radians(bound.rotation_upper)} can be proven for all configurations"
         return f"{worst.frame} is within tolerance where it was sampled, but {why}"
-    if worst.verdict == "not compared":
+    if worst.verdict is Verdict.NOT_COMPARED:
         return f"frame {worst.frame} was not compared: the engine does not have it or returned nothing finite"
     sizes = (
         (metres(worst.position.max), worst.position.max > source.tolerance.position),
         (radians(worst.rotation.max), worst.rotation.max > source.tolerance.rotation),
     )
     by = f"{worst.frame} off by {', '.join(text for text, over in sizes if over) or ', '.join(text for text, _ in sizes)}"
-    if worst.verdict.startswith("deviation") and worst.accepted:
+    if worst.verdict in (Verdict.DEVIATION_CHANGED, Verdict.DEVIATION_VANISHED) and worst.accepted:
         by += f"; the {worst.verdict} from the accepted {worst.accepted.position:g} m, {worst.accepted.rotation:g} rad"
     where = (
         worst.position.worst

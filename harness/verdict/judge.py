@@ -1,20 +1,17 @@
-"""The verdict on one source at one frame: agreement, disagreement, or a known deviation that must stay as it is."""
+"""The verdict on one source at one frame, on one source, and on one published placement."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Literal
 
 import numpy as np
 
+from harness.comparison.compare import Validity
 from harness.description.published import Published
+from harness.report.verdicts import FrameVerdict, SourceVerdict, Verdict
 from harness.se3 import Array
-
-FrameVerdict: TypeAlias = Literal[
-    "agrees", "disagrees", "accepted", "deviation changed", "deviation vanished", "not compared", "not certified"
-]
-
-FAILING: frozenset[str] = frozenset({"disagrees", "deviation changed", "deviation vanished", "not compared", "not certified"})
 
 
 @dataclass(frozen=True)
@@ -27,21 +24,39 @@ class Deviation:
 
 
 def judge(position: float, rotation: float, tolerance: tuple[float, float], deviation: Deviation | None) -> FrameVerdict:
-    """Verdict on largest discrepancies `position` [m] and `rotation` [rad], tolerance (m, rad).
+    """Verdict on the largest discrepancies of one source at one frame.
 
-    A deviation on file behaves like a strict expected failure: bigger, smaller or gone is a failure.
+    position, rotation: the discrepancies [m], [rad].
+    tolerance: [m], [rad].
+    deviation: what model.toml accepts there. It behaves like a strict expected failure: bigger, smaller or gone fails.
     """
     inside = position <= tolerance[0] and rotation <= tolerance[1]
     if deviation is None:
-        return "agrees" if inside else "disagrees"
+        return Verdict.AGREES if inside else Verdict.DISAGREES
     if inside:
-        return "deviation vanished"
+        return Verdict.DEVIATION_VANISHED
     parts = ((position, deviation.position, tolerance[0]), (rotation, deviation.rotation, tolerance[1]))
     for seen, on_file, limit in parts:
         as_filed = abs(seen - on_file) <= deviation.within * on_file if on_file > 0 else seen <= limit
         if not as_filed:
-            return "deviation changed"
-    return "accepted"
+            return Verdict.DEVIATION_CHANGED
+    return Verdict.ACCEPTED
+
+
+def judge_source(frames: Sequence[FrameVerdict], validity: Validity) -> SourceVerdict:
+    """Verdict on one source, from those at its frames and from whether its answers are placements that depend on q alone."""
+    if unfit := judge_validity(validity):
+        return unfit
+    if any(verdict.disagrees for verdict in frames):
+        return Verdict.DISAGREES
+    return Verdict.AGREES_AS_ACCEPTED if Verdict.ACCEPTED in frames else Verdict.AGREES
+
+
+def judge_validity(validity: Validity) -> Literal[Verdict.INVALID_PLACEMENTS, Verdict.KEEPS_STATE] | None:
+    """Why the answers of a source are no placements of a mechanism; None if they are."""
+    if validity.invalid:
+        return Verdict.INVALID_PLACEMENTS
+    return Verdict.KEEPS_STATE if validity.stateful else None
 
 
 @dataclass(frozen=True)

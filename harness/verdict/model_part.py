@@ -11,7 +11,7 @@ from harness.description.urdf import Urdf
 from harness.kinematics.side_by_side import COLUMNS, Unit, canonical_side, less, turned
 from harness.report.model_parts import DHFrame, Link, ParameterPair, SideBySide, Trees
 from harness.run.explaining import recipes_of
-from harness.run.results import Results
+from harness.run.outcome import Run
 from harness.se3 import Array
 
 MOST_LINKS = 120
@@ -50,14 +50,14 @@ def _links(urdf: Urdf, model: RobotModel) -> Iterator[Link]:
         ]
 
 
-def side_by_side(results: Results) -> SideBySide | None:
+def side_by_side(run: Run) -> SideBySide | None:
     """Canonical parameters of the table and of the URDF, from the base frame to the last frame both have; None without a URDF."""
-    model = results.model
+    model = run.model
     if model.urdf is None or model.urdf_joints is None:
         return None
     common = [f for f in model.frames.frames if f.urdf is not None]
     tip = next((f for f in reversed(common) if f.relation != "rigid"), common[-1]).name
-    kinds = [next(iter(recipes_of(model, kind, (tip,), results.offsets))) for kind in ("dh", "urdf")]
+    kinds = [next(iter(recipes_of(model, kind, (tip,), run.rigid_transforms))) for kind in ("dh", "urdf")]
     convention = model.table.convention
     a, b = (canonical_side(recipe.mechanism, convention, tip) for recipe in kinds)
     if problem := a.problem or b.problem:

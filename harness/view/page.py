@@ -26,7 +26,7 @@ class Page:
         self._session, self._server = session, server
         self.q = np.clip(np.zeros(len(session.model.table.joints)), *self._limits())
         self._busy = threading.RLock()
-        comparison = session.results.comparison
+        comparison = session.run.comparison
         reach = max(comparison.reach if comparison else 1.0, 0.1)
         server.scene.set_up_direction("+z")
         # Without the button by which viser would serve the page to the world.

@@ -14,12 +14,10 @@ from harness.description.model import RobotModel
 from harness.errors import EngineFailed
 from harness.kinematics.singular import singular
 from harness.run.options import Options
-from harness.run.plan import Participant, pair_tolerance, plan
-from harness.run.results import Results
+from harness.run.robot import load
 from harness.run.streaming import compare
-from harness.run.worst import pose_all
+from harness.run.worst import find_worst
 from harness.se3 import Array, position_error, rotation_error
-from harness.verdict.crosscheck import bind_all
 from harness.workers.pool import Workers
 
 
@@ -52,31 +50,28 @@ class Session:
         Raises InputError for wrong options, EngineFailed if the reference does not run.
         """
         self.model, self.options = model, options
-        self.results = Results(
-            model=model, options=options, participants=[Participant(planned=planned) for planned in plan(model, options)]
-        )
         self._lock = threading.Lock()
-        bind_all(self.results, workers)
-        self.results.comparison = compare(self.results, workers, None)
-        reference = self.results.participants[0]
-        if reference.bound is None or self.results.comparison is None:
+        self.run = load(model, options, workers)
+        self.run.comparison = compare(self.run, workers, None)
+        reference = self.run.reference
+        if reference.bound is None or self.run.comparison is None:
             raise EngineFailed(reference.name, f"the reference does not run: {reference.reason}")
-        self.results.posed = pose_all(self.results)
+        find_worst(self.run)
 
     @property
     def reference(self) -> str:
         """Name of the source that the others are compared with."""
-        return self.results.participants[0].name
+        return self.run.reference.name
 
     @property
     def sources(self) -> list[str]:
         """Names of the sources that run, reference first."""
-        return [p.name for p in self.results.participants if p.bound is not None]
+        return [o.name for o in self.run.outcomes if o.bound is not None]
 
     @property
     def absent(self) -> dict[str, str]:
         """Why each of the others does not run."""
-        return {p.name: p.reason for p in self.results.participants if p.bound is None}
+        return {o.name: o.reason for o in self.run.outcomes if o.bound is None}
 
     @cached_property
     def frames(self) -> list[str]:
@@ -89,30 +84,29 @@ class Session:
         names = [f.name for f in self.model.frames.frames]
         found = {}
         with self._lock:
-            for participant in self.results.participants:
-                if participant.bound is None:
+            for outcome in self.run.outcomes:
+                if outcome.bound is None:
                     continue
                 try:
-                    T = participant.bound.mapped(q[None, :])
-                    found[participant.name] = {names[i]: placement[0] for i, placement in T.items()}
+                    T = outcome.bound.mapped(q[None, :])
+                    found[outcome.name] = {names[i]: placement[0] for i, placement in T.items()}
                 except Exception as error:  # an engine's failure is its result
-                    participant.fail(error)
+                    outcome.fail(error)
         return found
 
     def apart(self, placements: Mapping[str, Mapping[str, Array]]) -> list[Apart]:
         """Discrepancies from the reference, source by source, from the base on."""
-        reference = self.results.participants[0]
-        base = placements.get(reference.name, {})
+        base = placements.get(self.reference, {})
         rows = []
-        for participant in self.results.participants[1:]:
-            limits = pair_tolerance(participant.planned, reference.planned)
+        for outcome in self.run.others:
+            limits = self.run.tolerance(outcome)
             for frame in self.frames:
-                T_a, T_b = base.get(frame), placements.get(participant.name, {}).get(frame)
+                T_a, T_b = base.get(frame), placements.get(outcome.name, {}).get(frame)
                 if T_a is None or T_b is None:
                     continue
                 errors = (float(position_error(T_a, T_b)), float(rotation_error(T_a, T_b)))
                 within = all(e <= limit for e, limit in zip(errors, limits, strict=True))
-                rows.append(Apart(source=participant.name, frame=frame, position=errors[0], rotation=errors[1], within=within))
+                rows.append(Apart(source=outcome.name, frame=frame, position=errors[0], rotation=errors[1], within=within))
         return rows
 
     @cached_property
@@ -121,20 +115,20 @@ class Session:
         law = self.model.configurations
         places = [Place("published" if c.published else "fixed", c.name, c.q) for c in law.fixed]
         places += [
-            Place("worst", f"{name} at {self.model.frames.frames[posed.frame].name}", law.one(self.options.seed, posed.index))
-            for name, posed in self.results.posed.items()
+            Place(
+                "worst", f"{o.name} at {self.model.frames.frames[o.worst.frame].name}", law.one(self.options.seed, o.worst.index)
+            )
+            for o in self.run.others
+            if o.worst is not None
         ]
         for i, (q, value) in enumerate(self._singular()):
             places.append(Place("singular", f"{i + 1}: smallest singular value {value:.1g}", q))
         return places
 
     def _singular(self) -> list[tuple[Array, float]]:
-        law, in_house = self.model.configurations, self.results.in_house
-        if in_house is None:
-            return []
+        law, in_house = self.model.configurations, self.run.in_house
         last = max(in_house.view.available, key=lambda i: self.frames.index(self.model.frames.frames[i].name))
-        comparison = self.results.comparison
-        reach = comparison.reach if comparison else 1.0
+        reach = self.run.discrepancies().reach
         with contextlib.suppress(np.linalg.LinAlgError):
             return singular(lambda q: in_house.mapped(q)[last], law.lattice()[:512], law.lower, law.upper, max(reach, 1e-3))
         return []

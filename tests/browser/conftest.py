@@ -14,8 +14,8 @@ from harness.description.model import load_model
 from harness.rendering.files import write_index, write_report
 from harness.report.document import Report
 from harness.run.options import Options
-from harness.verdict.accepted import accepted_from, compared
-from tests.helpers import copied, crosscheck
+from harness.verdict.accepted import accepted_from
+from tests.helpers import compared, copied, crosscheck
 
 # The browser's path, said aloud by whoever runs these tests (nox -s browser).
 BROWSER = os.environ.get("CROSSCHECK_TESTS_BROWSER", "")

@@ -24,9 +24,10 @@ from harness.rendering.junit import render_junit
 from harness.rendering.markdown import render_markdown
 from harness.report import document as doc
 from harness.report import explanation as reasons
-from harness.run.binding import bind, measure_rigid
+from harness.run.binding import bind
 from harness.run.explaining import problem_of
 from harness.run.options import Options
+from harness.run.rigid import measure_rigid, transforms
 from harness.se3 import Array
 from tests.helpers import Edit, crosscheck
 
@@ -98,7 +99,7 @@ def bound_problem(model: RobotModel, source: Engine, tolerance: float = 1e-10): 
     assert model.urdf is not None
     q = model.configurations.lattice()
     measured = measure_rigid(model, in_house, bind(UrdfPinocchio(model.urdf), model, {}), q)
-    offsets = {name: m.offset for name, m in measured.items()}
+    offsets = transforms(measured)
     reference = bind(DHNumpy(model.table), model, offsets)
     return problem_of(model, offsets, reference, bind(source, model, offsets), (tolerance, tolerance))
 

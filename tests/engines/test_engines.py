@@ -29,6 +29,7 @@ from harness.engines.base import Description, Engine, Trait
 from harness.engines.dh_numpy import DHNumpy
 from harness.engines.registry import REFERENCE, adapter_of, description_of, registered
 from harness.errors import EngineFailed, EngineUnavailable, InputError
+from harness.report.verdicts import Verdict
 from harness.run.options import Options
 from harness.se3 import Array
 from harness.workers.pool import Workers
@@ -314,7 +315,7 @@ def test_the_mapping_says_where_a_single_chain_ends(models: dict[str, RobotModel
     for robot, last in (("ur5", "ee_link"), ("ur5e", "tool0")):
         report = crosscheck(models[robot], Options(samples=50, seed=0, sources=("urdf:ikpy",)))
         (source,) = (s for s in report.sources if s.name == "urdf:ikpy")
-        assert source.verdict == "agrees"
+        assert source.verdict is Verdict.AGREES
         assert last in {f.frame for f in source.frames}
         assert source.read_in == "base_link"
         assert source.absent[0] == "base"
@@ -330,10 +331,10 @@ def test_an_oblique_axis_is_wrong_in_one_library_alone(tmp_path: Path) -> None:
     model = load_model(write_model(derived, "oblique", "urdf:pinocchio", tmp_path))
     report = crosscheck(model, Options(samples=200, all_engines=True))
     verdicts = {s.name: s.verdict for s in report.sources if s.name not in WITHOUT}
-    assert verdicts.pop("dh:roboticstoolbox-packaged") == "not run"
+    assert verdicts.pop("dh:roboticstoolbox-packaged") is Verdict.NOT_RUN
     assert {name for name, verdict in verdicts.items() if verdict not in ("agrees", "reference")} == {"urdf:roboticstoolbox"}
     (wrong,) = (s for s in report.sources if s.name == "urdf:roboticstoolbox")
-    assert wrong.verdict == "disagrees"
+    assert wrong.verdict is Verdict.DISAGREES
     assert any("taken for z" in text for text in wrong.explained_by)
     assert report.verdict.exit_code == 1
 

@@ -13,8 +13,9 @@ from harness.comparison.compare import Comparison
 from harness.comparison.components import View, components, discrepancies, mapped, matrices, rotation_residual
 from harness.comparison.shrink import shrink
 from harness.comparison.statistics import Stream
+from harness.report.verdicts import FrameVerdict
 from harness.se3 import Array
-from harness.verdict.judge import Deviation, FrameVerdict, judge
+from harness.verdict.judge import Deviation, judge
 from harness.verdict.noise import CLASSES, classify
 from tests.helpers import assert_placements_close, transforms
 

@@ -20,6 +20,7 @@ from harness.report.document import Report
 from harness.report.explanation import OneChange
 from harness.verdict.crosscheck import crosscheck
 from tests.conftest import WITHOUT
+from tests.helpers import remade
 
 PINOCCHIO, FLOAT32 = "urdf:pinocchio", "urdf:pytorch-kinematics"
 
@@ -141,7 +142,7 @@ def test_a_cause_is_named_by_joint_number_and_size(cause: Cause, hit: bool) -> N
 
 
 def test_an_angle_is_the_same_a_turn_away() -> None:
-    turned = CHANGE.model_copy(update={"unit": "rad", "parameter": "theta", "size": 0.1 - 2 * math.pi})
+    turned = remade(CHANGE, unit="rad", parameter="theta", size=0.1 - 2 * math.pi)
     assert Cause("parameter", "elbow", "theta", 0.1).named_by(turned)
 
 

@@ -19,7 +19,7 @@ from harness.report.pose import FramePair, Pose
 from harness.report.source_parts import At
 from harness.run.options import Options
 from harness.se3 import Array
-from tests.helpers import crosscheck, transforms
+from tests.helpers import crosscheck, remade, transforms
 
 AT = At(index=0, label="zero", q=[0.0])
 
@@ -122,14 +122,14 @@ def test_every_drawn_number_is_one_compared(models: dict[str, RobotModel]) -> No
 
 def test_what_is_drawn_has_a_budget(models: dict[str, RobotModel], monkeypatch: pytest.MonkeyPatch) -> None:
     report = crosscheck(models["ur5"], Options(samples=20, seed=0, sources=("dh:pinocchio", "urdf:pinocchio"), certify=False))
-    worse = [s.model_copy(update={"verdict": "disagrees"}) if s.name == "urdf:pinocchio" else s for s in report.sources]
-    report = report.model_copy(update={"sources": worse})
+    worse = [remade(s, verdict="disagrees") if s.name == "urdf:pinocchio" else s for s in report.sources]
+    report = remade(report, sources=worse)
     one = len(json.dumps(skeletons(report)["source-2"]))
     monkeypatch.setattr(figures, "BUDGET", one + 10)
     assert list(skeletons(report)) == ["source-2"]
-    many = [worse[2].model_copy(update={"name": f"urdf:engine{i}"}) for i in range(60)]
+    many = [remade(worse[2], name=f"urdf:engine{i}") for i in range(60)]
     monkeypatch.undo()
-    assert len(render_html(report.model_copy(update={"sources": [*worse, *many]}))) < 3e6
+    assert len(render_html(remade(report, sources=[*worse, *many]))) < 3e6
 
 
 def test_colours_grow_darker_with_the_exponent() -> None:

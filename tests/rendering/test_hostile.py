@@ -23,10 +23,10 @@ from harness.report.document import Report
 from harness.report.json_file import to_json
 from harness.report.text import plain
 from harness.run.options import Options
-from harness.verdict.accepted import accepted_from, accepted_text, compared
+from harness.verdict.accepted import accepted_from, accepted_text
 from harness.view.page import table
 from harness.view.session import Apart
-from tests.helpers import copied, crosscheck
+from tests.helpers import compared, copied, crosscheck, remade
 
 NAMES = (
     "<script>alert(1)</script>",
@@ -78,8 +78,8 @@ def disagreeing(tmp_path_factory: pytest.TempPathFactory) -> Report:
     )
     report = Report.model_validate(document)
     first = accepted_from(report)
-    source = first.sources["urdf:pinocchio"].model_copy(update={"verdict": "NAME"})
-    return compared(report, first.model_copy(update={"sources": {**first.sources, "urdf:pinocchio": source}}), True)
+    source = remade(first.sources["urdf:pinocchio"], verdict="NAME")
+    return compared(report, remade(first, sources={**first.sources, "urdf:pinocchio": source}), True)
 
 
 def hostile(report: Report, name: str) -> Report:

@@ -22,8 +22,8 @@ from harness.report.document import Report
 from harness.report.json_file import read_report, schema, to_json
 from harness.report.text import metres, numbers, plain, radians
 from harness.run.options import Options
-from harness.verdict.accepted import accepted_from, compared
-from tests.helpers import crosscheck
+from harness.verdict.accepted import accepted_from
+from tests.helpers import compared, crosscheck, remade
 
 FAST = ("dh:pinocchio", "urdf:pinocchio")
 
@@ -203,11 +203,9 @@ def test_the_summary_of_a_job_is_the_markdown(
 
 
 def test_markdown_is_a_screenful_however_much_there_is(disagreeing: Report) -> None:
-    many = [disagreeing.sources[2].model_copy(update={"name": f"urdf:engine{i}"}) for i in range(40)]
-    out = [s.model_copy(update={"status": "not run", "verdict": "not run", "frames": [], "reason": "x"}) for s in many]
-    report = disagreeing.model_copy(
-        update={"sources": [*disagreeing.sources, *many, *out], "published": disagreeing.published * 9}
-    )
+    many = [remade(disagreeing.sources[2], name=f"urdf:engine{i}") for i in range(40)]
+    out = [remade(s, status="not run", verdict="not run", frames=[], reason="x") for s in many]
+    report = remade(disagreeing, sources=[*disagreeing.sources, *many, *out], published=disagreeing.published * 9)
     report = compared(report, accepted_from(disagreeing), False)
     text = render_markdown(report)
     assert len(text.splitlines()) <= 60

@@ -17,8 +17,8 @@ from harness.rendering.markdown import render_markdown
 from harness.report.document import Report
 from harness.report.json_file import read_report
 from harness.run.options import Options
-from harness.verdict.accepted import accepted_from, accepted_text, compared, read_accepted, since
-from tests.helpers import crosscheck
+from harness.verdict.accepted import accepted_from, accepted_text, read_accepted, since
+from tests.helpers import compared, crosscheck, remade
 
 FAST = ("dh:pinocchio", "urdf:pinocchio")
 Cli = Callable[..., "subprocess.CompletedProcess[str]"]
@@ -30,16 +30,16 @@ def report(models: dict[str, RobotModel]) -> Report:
 
 
 def changed(report: Report, name: str, **update: object) -> Report:
-    sources = [s.model_copy(update=update) if s.name == name else s for s in report.sources]
-    return report.model_copy(update={"sources": sources})
+    sources = [remade(s, **update) if s.name == name else s for s in report.sources]
+    return remade(report, sources=sources)
 
 
 def grown(report: Report, name: str, by: float) -> Report:
     """The report with the position error of a source's last frame `by` larger [m]."""
     source = next(s for s in report.sources if s.name == name)
     last = source.frames[-1]
-    position = last.position.model_copy(update={"max": last.position.max + by})
-    return changed(report, name, frames=[*source.frames[:-1], last.model_copy(update={"position": position})])
+    position = remade(last.position, max=last.position.max + by)
+    return changed(report, name, frames=[*source.frames[:-1], remade(last, position=position)])
 
 
 def test_a_report_is_itself(report: Report, tmp_path: Path) -> None:
@@ -108,7 +108,7 @@ def test_what_is_no_number(report: Report, update: dict[str, object], what: str,
 def test_a_frame_or_a_source_that_is_gone_fails(report: Report) -> None:
     source = report.sources[2]
     assert since(accepted_from(report), changed(report, source.name, frames=source.frames[:-1]), True).worse
-    without = report.model_copy(update={"sources": report.sources[:2]})
+    without = remade(report, sources=report.sources[:2])
     gone = since(accepted_from(report), without, True)
     assert [(c.what, c.after) for c in gone.changed] == [("urdf:pinocchio", "not there")]
     assert gone.worse
@@ -119,7 +119,7 @@ def test_a_frame_or_a_source_that_is_gone_fails(report: Report) -> None:
 
 def test_other_settings_cannot_be_compared(report: Report) -> None:
     numbers = accepted_from(report)
-    other = report.model_copy(update={"settings": report.settings.model_copy(update={"samples": 51})})
+    other = remade(report, settings=remade(report.settings, samples=51))
     later = compared(other, numbers, True)
     assert later.verdict.exit_code == 1
     assert "accepted with other settings (samples: 50, now 51)" in later.verdict.sentence
@@ -138,7 +138,7 @@ def test_fewer_configurations_are_a_part_of_those_accepted(report: Report, model
 
 
 def test_an_exit_code_of_1_stays(report: Report) -> None:
-    failed = report.model_copy(update={"verdict": report.verdict.model_copy(update={"exit_code": 3, "sentence": "sixr IS NOT"})})
+    failed = remade(report, verdict=remade(report.verdict, exit_code=3, sentence="sixr IS NOT"))
     assert compared(grown(failed, "urdf:pinocchio", 1.0), accepted_from(report), True).verdict.exit_code == 1
 
 

@@ -18,10 +18,11 @@ from harness.engines.urdf_pinocchio import UrdfPinocchio
 from harness.errors import InputError
 from harness.report.document import Report, Source
 from harness.report.json_file import to_json
+from harness.report.verdicts import Verdict
 from harness.run.options import Options
 from harness.se3 import Array
 from tests.conftest import WITHOUT
-from tests.helpers import Edit, crosscheck
+from tests.helpers import Edit, crosscheck, remade
 
 FAST = ("dh:pinocchio", "urdf:pinocchio")
 
@@ -122,10 +123,10 @@ def test_faults_are_caught_and_located(copy_model: Callable[..., Path], name: st
     report = check(copy_model(fault.robot, *fault.edits))
     found = source(report, "urdf:pinocchio")
     assert report.verdict.exit_code == 1
-    assert found.verdict == "disagrees"
+    assert found.verdict is Verdict.DISAGREES
     assert found.first_disagreeing_frame == fault.first
     result = next(f for f in found.frames if f.frame == fault.frame)
-    assert result.verdict == "disagrees"
+    assert result.verdict is Verdict.DISAGREES
     if fault.size is not None:
         assert result.position.max == pytest.approx(fault.size, rel=1e-3, abs=1e-9)
     # The reproducer really shows it: recomputed here from its q alone.
@@ -151,14 +152,14 @@ def test_what_q_zero_does_not_show(copy_model: Callable[..., Path]) -> None:
 
 def test_dh_sources_agree_whatever_the_urdf_says(copy_model: Callable[..., Path]) -> None:
     report = check(copy_model("ur5", ("dh.csv", "0.089159", "0.089460")))
-    assert source(report, "dh:pinocchio").verdict == "agrees"
+    assert source(report, "dh:pinocchio").verdict is Verdict.AGREES
 
 
 def test_a_rigid_frame_that_is_not_rigid(copy_model: Callable[..., Path]) -> None:
     """forearm_link declared to ride on DH frame 2: its offset cannot be constant."""
     report = check(copy_model("ur5", ("frames.toml", 'dh = 3\nurdf = "forearm_link"', 'dh = 2\nurdf = "forearm_link"')))
     assert report.verdict.exit_code == 1
-    assert [f.frame for f in source(report, "urdf:pinocchio").frames if f.verdict == "disagrees"] == ["forearm_link"]
+    assert [f.frame for f in source(report, "urdf:pinocchio").frames if f.verdict is Verdict.DISAGREES] == ["forearm_link"]
 
 
 def test_a_rigid_offset_is_measured_to_rounding(models: dict[str, RobotModel]) -> None:
@@ -225,8 +226,8 @@ def test_a_deviation_belongs_to_the_source_not_to_the_reference(models: dict[str
         models["iiwa14"], Options(samples=2000, seed=0, sources=("dh:numpy", "urdf:yourdfpy"), reference="urdf:pinocchio")
     )
     assert report.verdict.exit_code == 0
-    assert source(report, "dh:numpy").verdict == "agrees as accepted"
-    assert source(report, "urdf:yourdfpy").verdict == "agrees"
+    assert source(report, "dh:numpy").verdict is Verdict.AGREES_AS_ACCEPTED
+    assert source(report, "urdf:yourdfpy").verdict is Verdict.AGREES
 
 
 # Sources that are missing, broken or wrong -------------------------------------------------------
@@ -318,7 +319,7 @@ def test_an_engine_that_goes_wrong_is_that_engines_result(
     fake = source(report, "dh:fake")
     assert (fake.status, fake.verdict, report.verdict.exit_code) == (status, verdict, code)
     assert reason in fake.reason
-    assert source(report, "dh:pinocchio").verdict == "agrees"  # the others are not harmed
+    assert source(report, "dh:pinocchio").verdict is Verdict.AGREES  # the others are not harmed
     if status != "ran":
         assert not fake.frames
         assert all("dh:fake" not in (p.a, p.b) for p in report.pairs)
@@ -418,9 +419,9 @@ def test_the_same_command_twice_gives_the_same_numbers(models: dict[str, RobotMo
     wanted = tuple(entry.name for entry in models["ur5"].file.source if entry.name not in WITHOUT)
     first, second = (crosscheck(models["ur5"], Options(samples=300, seed=5, sources=wanted)) for _ in range(2))
     same = {"environment": first.environment}
-    assert to_json(first.model_copy(update=same)) == to_json(second.model_copy(update=same))
-    other = crosscheck(models["ur5"], Options(samples=300, seed=6, sources=wanted)).model_copy(update=same)
-    assert to_json(first.model_copy(update=same)) != to_json(other)
+    assert to_json(remade(first, **same)) == to_json(remade(second, **same))
+    other = remade(crosscheck(models["ur5"], Options(samples=300, seed=6, sources=wanted)), **same)
+    assert to_json(remade(first, **same)) != to_json(other)
 
 
 def test_tolerances_add_up_against_another_reference(models: dict[str, RobotModel]) -> None:

@@ -32,7 +32,7 @@ FAST = Options(samples=50, seed=0, sources=("dh:pinocchio", "urdf:pinocchio"), c
 @pytest.fixture(scope="module")
 def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Session]:
     folder = copied(tmp_path_factory.mktemp("view"), "ur5", ("dh.csv", "0.089159", "0.089460"))
-    with FAST.workshop() as workers:
+    with FAST.worker_pool() as workers:
         yield Session(load_model(folder), FAST, workers)
 
 
@@ -108,11 +108,11 @@ def test_places_are_the_published_the_worst_and_the_singular(session: Session) -
 def test_a_source_that_fails_later_is_left_out(models: dict[str, RobotModel]) -> None:
     with Options(
         samples=10, seed=0, sources=("dh:pinocchio",), certify=False, explain=False, in_process=True
-    ).workshop() as workers:
+    ).worker_pool() as workers:
         session = Session(
             models["sixr"], Options(samples=10, seed=0, sources=("dh:pinocchio",), certify=False, explain=False), workers
         )
-        bound = session.results.participants[1].bound
+        bound = session.run.others[0].bound
         assert bound is not None
 
         def broken(q: Array, frames: object) -> Array:

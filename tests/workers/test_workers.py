@@ -23,6 +23,7 @@ from harness.errors import InputError
 from harness.rendering.files import write_report
 from harness.report.document import Report, Source
 from harness.report.json_file import read_report
+from harness.report.verdicts import Verdict
 from harness.run.options import Options
 from harness.verdict.crosscheck import crosscheck
 from harness.workers.pool import Workers
@@ -112,7 +113,7 @@ def test_faults(models: dict[str, RobotModel], tmp_path: Path, fault: str, verdi
     assert reason in controller.reason
     if verdict == "failed" and "at the start" not in reason and "version" not in reason and "block" in fault:
         assert "(configurations 8192 to 9014)" in controller.reason
-    assert named(report, "dh:pinocchio").verdict == "agrees"
+    assert named(report, "dh:pinocchio").verdict is Verdict.AGREES
     write_report(report, tmp_path)
     assert read_report(tmp_path / "ur3.json") == report
     ElementTree.parse(tmp_path / "ur3.junit.xml")
@@ -149,7 +150,7 @@ def test_one_that_dies_while_it_is_certified_has_failed(models: dict[str, RobotM
     report = with_fault(models["ur3"], "dies beyond the limits", samples=10, certify=True)
     assert (named(report, "controller").verdict, report.verdict.exit_code) == ("failed", 3)
     assert "exited with code 9" in named(report, "controller").reason
-    assert named(report, "dh:pinocchio").verdict == "agrees"
+    assert named(report, "dh:pinocchio").verdict is Verdict.AGREES
 
 
 def test_a_narrow_pipe(models: dict[str, RobotModel], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,180 @@
+"""What became of each source of a run, before it becomes a report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
+
+from harness.cause.explain import Explanation
+from harness.certificate.certify import Bounds
+from harness.comparison.compare import Comparison
+from harness.description.model import RobotModel
+from harness.errors import EngineFailed, EngineUnavailable
+from harness.run.binding import Bound
+from harness.run.options import Options
+from harness.run.plan import Planned, pair_tolerance
+from harness.run.rigid import Offset, transforms
+from harness.se3 import Array
+
+Status: TypeAlias = Literal["ran", "not run", "failed"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reproduced:
+    """The shrunk worst configuration of a source.
+
+    frame: index of the mapped frame.
+    q: (n,) in model order.
+    position, rotation: the discrepancy there [m], [rad].
+    T_reference, T_source: both placements of the frame, (4, 4).
+    """
+
+    frame: int
+    q: Array
+    position: float
+    rotation: float
+    T_reference: Array
+    T_source: Array
+
+
+@dataclass(frozen=True)
+class Worst:
+    """Where a source is furthest off, in parts of its tolerance.
+
+    index: number of the configuration.
+    frame: index of the mapped frame.
+    placements: both placements (4, 4) of each common frame, reference first, by frame index.
+    """
+
+    index: int
+    frame: int
+    placements: dict[int, tuple[Array, Array]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Certified:
+    """A source's certificate against the reference, or why it has none (`reason`).
+
+    form: `grid` or `links`.
+    nodes: configurations evaluated.
+    residual, reference_residual: how far each engine is from its own interpolant.
+    limit: how far rounding explains.
+    frames: indices of the mapped frames certified.
+    bounds: the proven bounds there.
+    position_found, rotation_found: largest discrepancies seen there, (F,) [m], [rad].
+    """
+
+    reason: str = ""
+    form: str = ""
+    nodes: int = 0
+    residual: float = 0.0
+    reference_residual: float = 0.0
+    limit: float = 0.0
+    frames: Sequence[int] = ()
+    bounds: Bounds | None = None
+    position_found: Array | None = None
+    rotation_found: Array | None = None
+
+
+@dataclass(frozen=True)
+class Explained:
+    """Why a source disagrees: the repair that works, or what is known of the difference without one."""
+
+    explanation: Explanation | None = None
+    unexplained: str = ""
+
+
+@dataclass(kw_only=True)
+class Outcome:
+    """One planned source and everything that became of it.
+
+    planned: what was asked of it.
+    status: `ran` until it fails.
+    reason, install: why it does not run, and the line that installs it.
+    bound: its engine; None once it does not run.
+    reproduced, worst, certified, explained: what the phases of the run gave; None where they had nothing to say.
+    """
+
+    planned: Planned
+    status: Status = "ran"
+    reason: str = ""
+    install: str = ""
+    bound: Bound | None = None
+    reproduced: Reproduced | None = None
+    worst: Worst | None = None
+    certified: Certified | None = None
+    explained: Explained | None = None
+
+    @property
+    def name(self) -> str:
+        """Source name."""
+        return self.planned.name
+
+    def running(self) -> Bound:
+        """Its engine. Raises RuntimeError if it does not run."""
+        if self.bound is None:
+            raise RuntimeError(f"{self.name} is not bound")
+        return self.bound
+
+    def fail(self, error: Exception) -> None:
+        """Take the source out and keep why. What third-party code raises is its result, not the end of the run.
+
+        What the source gave before goes with it: a partial result is no result.
+        """
+        self.bound = self.reproduced = self.worst = self.certified = self.explained = None
+        self.status = "not run" if isinstance(error, EngineUnavailable) else "failed"
+        self.reason = error.reason if isinstance(error, EngineUnavailable | EngineFailed) else f"{type(error).__name__}: {error}"
+        self.install = (error.install or "") if isinstance(error, EngineUnavailable) else ""
+
+
+@dataclass(kw_only=True)
+class Run:
+    """One robot model cross-checked.
+
+    model: the robot model.
+    options: what was asked.
+    reference: the source that the others are compared with.
+    others: every other planned source, in order.
+    in_house: the in-house FK, bound to the model.
+    offsets: the measured offsets of rigid frames.
+    comparison: discrepancies of all sources; None if the reference does not run.
+    seconds, loaded_in: time of the whole run, and until every engine was there [s].
+    """
+
+    model: RobotModel
+    options: Options
+    reference: Outcome
+    others: tuple[Outcome, ...]
+    in_house: Bound
+    offsets: dict[str, Offset] = field(default_factory=dict)
+    comparison: Comparison | None = None
+    seconds: float = 0.0
+    loaded_in: float = 0.0
+
+    @property
+    def outcomes(self) -> tuple[Outcome, ...]:
+        """The reference, then all others."""
+        return self.reference, *self.others
+
+    @property
+    def compared(self) -> list[Outcome]:
+        """The others that run, if the reference does: those of which discrepancies are known."""
+        if self.comparison is None or self.reference.bound is None:
+            return []
+        return [o for o in self.others if o.bound is not None and o.name in self.comparison.position]
+
+    @property
+    def rigid_transforms(self) -> dict[str, Array]:
+        """The measured offsets T_dh_frame (4, 4) of rigid frames, by frame name."""
+        return transforms(self.offsets)
+
+    def tolerance(self, outcome: Outcome) -> tuple[float, float]:
+        """Tolerance [m], [rad] of a source against the reference."""
+        return pair_tolerance(outcome.planned, self.reference.planned)
+
+    def discrepancies(self) -> Comparison:
+        """The comparison. Raises RuntimeError if the reference does not run."""
+        if self.comparison is None:
+            raise RuntimeError(f"nothing was compared: {self.reference.name} does not run")
+        return self.comparison
