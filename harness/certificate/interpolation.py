@@ -19,6 +19,8 @@ from harness.se3 import Array
 
 Complex: TypeAlias = NDArray[np.complex128]
 
+GRID_LIMIT = 4096  # nodes of the largest grid on which an engine is evaluated
+
 
 @dataclass(frozen=True)
 class Axis:

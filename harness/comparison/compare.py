@@ -18,19 +18,17 @@ from harness.comparison.components import (
     rotation_residual,
 )
 from harness.comparison.statistics import Stream
-from harness.se3 import Array
+from harness.se3 import REPEATED, RIGID, Array
 
 Mask: TypeAlias = NDArray[np.bool_]
 
 CHUNK = 1024
-VALID = 1e-6
-SAME = 1e-9  # batches round differently from single configurations, float32 origins and all
 HUGE = 1e100  # beyond this a length is as good as infinite: its square would be
 
 
 @dataclass(kw_only=True)
 class Validity:
-    """Whether a source's placements are placements: finite, last row 0 0 0 1, rotation in SO(3) to within `VALID`.
+    """Whether a source's placements are placements: finite, last row 0 0 0 1, rotation in SO(3) to within `se3.RIGID`.
 
     `residual` is the worst |R'R - I| kind of error seen (see `rotation_residual`); `first` is (configuration index, raw
     frame index) of the first placement that failed. `again` is the largest difference between what the source answered for
@@ -47,7 +45,7 @@ class Validity:
     @property
     def stateful(self) -> bool:
         """Whether the answer depends on what was asked before, by more than rounding does."""
-        return self.again > SAME
+        return self.again > REPEATED
 
 
 @dataclass
@@ -121,12 +119,12 @@ class Comparison:
         residual = rotation_residual(C)
         worst = float(residual.max(initial=0.0))
         last_row_ok = bool(np.array_equal(T[:, :, 3, :], np.broadcast_to([0.0, 0.0, 0.0, 1.0], (*T.shape[:2], 4))))
-        if worst <= VALID and last_row_ok and np.abs(C[:, 3]).max(initial=0.0) < HUGE:
+        if worst <= RIGID and last_row_ok and np.abs(C[:, 3]).max(initial=0.0) < HUGE:
             validity.residual = max(validity.residual, worst)
             return None
         finite: Mask = np.asarray((np.abs(C) < HUGE).all(axis=(1, 2)))
         last = np.abs(T[:, :, 3, :] - [0.0, 0.0, 0.0, 1.0]).max(axis=2).T
-        good = finite & (residual <= VALID) & (last <= VALID)
+        good = finite & (residual <= RIGID) & (last <= RIGID)
         validity.residual = max(validity.residual, float(np.where(finite, residual, 0.0).max(initial=0.0)))
         bad = np.argwhere(~good.T)
         validity.invalid += len(bad)
@@ -137,7 +135,7 @@ class Comparison:
     @staticmethod
     def _usable(finite: Mask, view: View) -> Mask:
         """Mask of mapped frames whose raw placement, and base, is finite: an invalid but finite one is still measured."""
-        mask: Mask = finite[[view.slots[f] for f in view.available]]
+        mask: Mask = finite[view.raw_frames]
         return mask if view.base is None else np.logical_and(mask, finite[view.base])
 
     def _common(

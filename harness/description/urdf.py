@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
-from harness.errors import UrdfError, nearest
+from harness.errors import InputError, UrdfError, nearest
 
 MOVABLE = ("revolute", "continuous", "prismatic")
 UNSUPPORTED = ("floating", "planar")
@@ -100,6 +100,11 @@ class Urdf(UrdfText):
         for joint in self.joint_list:
             below[joint.parent] = (*below.get(joint.parent, ()), joint)
         return below
+
+    def require_link(self, link: str, key: str) -> None:
+        """Raise InputError, naming the option `key`, if there is no such link."""
+        if link not in self.links:
+            raise InputError(f"no link {link!r} in {self.path.name}; {nearest(link, self.links)}", key=key)
 
     def to_root(self, link: str) -> tuple[UrdfJoint, ...]:
         """Joints from `link` up to its root. Raises KeyError for an unknown link, UrdfError if it runs in a circle."""

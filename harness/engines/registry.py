@@ -9,7 +9,6 @@ from importlib import metadata
 from harness.description.model import RobotModel
 from harness.description.packaged import Packaged
 from harness.description.urdf import UrdfText
-from harness.engines import requirements
 from harness.engines.base import Description, Engine
 from harness.errors import DescriptionUnavailable, EngineUnavailable, InputError, nearest
 
@@ -32,7 +31,7 @@ def registered() -> dict[str, Registered]:
 
     The entry point's name is the source name with `-` for `:`. A broken third-party adapter is listed with its problem.
     """
-    found: dict[str, Registered] = {}
+    engines: dict[str, Registered] = {}
     for point in metadata.entry_points(group=GROUP):
         source = point.name.replace("-", ":", 1)
         try:
@@ -42,10 +41,10 @@ def registered() -> dict[str, Registered]:
             entry = Registered(adapter.source, adapter)
         except Exception as error:  # third-party code: whatever it raises must not end the run
             entry = Registered(source, None, f"entry point {point.value}: {type(error).__name__}: {error}")
-        if entry.name in found and found[entry.name].adapter is not entry.adapter:
+        if entry.name in engines and engines[entry.name].adapter is not entry.adapter:
             entry = Registered(entry.name, None, f"two packages offer {entry.name}: second is {point.value}")
-        found[entry.name] = entry
-    return dict(sorted(found.items(), key=lambda item: (item[0] != REFERENCE, item[0])))
+        engines[entry.name] = entry
+    return dict(sorted(engines.items(), key=lambda item: (item[0] != REFERENCE, item[0])))
 
 
 def adapter_of(source: str) -> type[Engine]:
@@ -81,12 +80,3 @@ def description_of(source: str, model: RobotModel, takes: str = "") -> Descripti
         return model.urdf
     link = next(frame.urdf for frame in model.frames.frames if frame.name == names.tip)
     return UrdfText(model.urdf.text, tip=link or "")
-
-
-def load_engine(source: str, model: RobotModel) -> Engine:
-    """Build the engine `source` on the model's description, in this process.
-
-    Raises InputError (unknown source), EngineUnavailable (not installed), EngineFailed (refuses the description).
-    """
-    adapter = adapter_of(source)
-    return requirements.build(adapter, description_of(source, model, adapter.takes))

@@ -58,7 +58,7 @@ class Bound:
 
     def should_have(self, frame: int) -> bool:
         """Whether the mapped frame with this index can be expected of this source: its description has it."""
-        return self.view.slots[frame] >= 0 or frame in self.missing
+        return self.view.slots[frame] is not None or frame in self.missing
 
     def raw(self, q: Array) -> Array:
         """Placements as the engine returns them, q (N, n) in model order: (N, len(frames), 4, 4)."""
@@ -95,12 +95,12 @@ def bind(engine: Engine, model: RobotModel, offsets: Mapping[str, Array]) -> Bou
     if isinstance(engine, ProcessEngine) and engine.is_program:
         _check_frame_names(engine, kind, names, model)
     read = [x for x in dict.fromkeys(labels.values()) if x is not None and x in engine.frames]
-    slots = tuple(read.index(x) if x in read else -1 for x in labels.values())
+    slots = tuple(read.index(x) if x in read else None for x in labels.values())
     missing = tuple(i for i, x in enumerate(labels.values()) if x is not None and x not in read)
     absent = [f.name for f in frames if f.name in names.without]
     undeclared = [frames[i].name for i in missing] if engine.partial else []
     if engine.partial:
-        if joint := unchecked_joint((f for f, slot in zip(frames, slots, strict=True) if slot >= 0), model.table):
+        if joint := unchecked_joint((f for f, slot in zip(frames, slots, strict=True) if slot is not None), model.table):
             asked = ", ".join(dict.fromkeys(x for x in labels.values() if x is not None))
             has = ", ".join(engine.frames)
             raise EngineFailed(

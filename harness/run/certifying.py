@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 
 from harness.certificate.certify import Bounds, Evaluate, Sampled, certify, found_from, rounding_of, sample, tighter
-from harness.certificate.interpolation import Axis, grid, weights
+from harness.certificate.interpolation import GRID_LIMIT, Axis, grid, weights
 from harness.certificate.joint_axes import UncertifiableError, joint_axes
 from harness.certificate.links import Link, SampledLinks, certify_links, sample_links
 from harness.comparison.components import components, mapped
@@ -21,8 +21,6 @@ from harness.run.plan import Participant
 from harness.run.results import Certified, Results
 from harness.se3 import Array
 from harness.workers.pool import Workers
-
-GRID_LIMIT = 4096
 
 Certify: TypeAlias = "Callable[[Participant], Certified]"
 

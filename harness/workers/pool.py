@@ -19,15 +19,13 @@ from harness.engines.base import Description, Engine
 from harness.errors import EngineFailed
 from harness.workers import protocol
 from harness.workers.child import Child, ChildError
-from harness.workers.environments import own_environment, where
+from harness.workers.environments import THREAD_VARIABLES, own_environment, where
 from harness.workers.memory import MemoryWatch
 from harness.workers.process import Limits, ProcessEngine
 
 Result = TypeVar("Result")
 
 WATCH = 0.1  # seconds between two looks at a worker's memory
-# One thread a worker: the cores are shared among workers, not fought over by their libraries.
-ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class Workers:
@@ -113,7 +111,7 @@ class Workers:
         if served is not None:
             with contextlib.suppress(EngineFailed):  # what it served before may have spoilt it: a new one then
                 return ProcessEngine(source, served, protocol.AGAIN + greeting, self.limits, adapter)
-        env = {**dict.fromkeys(ONE_THREAD, "1"), **(own_environment(command[0]) if adapter else os.environ)}
+        env = {**dict.fromkeys(THREAD_VARIABLES, "1"), **(own_environment(command[0]) if adapter else os.environ)}
         try:
             with self._lock:
                 if self._closing.is_set():
@@ -139,7 +137,7 @@ class Workers:
         while not self._closing.wait(WATCH):
             for child in list(self._children):
                 if child.process.poll() is None and (used := watch.used(child.process.pid)) > self.limits.memory:
-                    child.over = f"used {_size(used)} of memory, {_size(self.limits.memory)} are allowed"
+                    child.kill_reason = f"used {_size(used)} of memory, {_size(self.limits.memory)} are allowed"
                     child.kill()
 
 

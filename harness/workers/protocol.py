@@ -19,7 +19,7 @@ from harness.engines.base import Description
 
 PROTOCOL = "fk-crosscheck"
 VERSION = 1
-MAX_BLOCK = 4096
+MAX_BLOCK = 4096  # configurations in one block, a limit of the protocol
 FAILED = -1.0
 FLOAT = np.dtype("<f8")
 AGAIN = np.zeros(1, FLOAT).tobytes()
