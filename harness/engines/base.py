@@ -62,7 +62,6 @@ class Engine(ABC):
     debian: ClassVar[tuple[str, ...]] = ()
     imports: ClassVar[tuple[str, ...]] = ()
     traits: tuple[Trait, ...] = ()
-    applies_mimic: ClassVar[bool] = False
 
     joints: tuple[str, ...]
     frames: tuple[str, ...]
@@ -97,14 +96,14 @@ class Engine(ABC):
     @classmethod
     def versions(cls) -> dict[str, str]:
         """Installed version of each required distribution in this environment; those that are missing are left out."""
-        found = {}
+        versions = {}
         for requirement in cls.requirements:
             name = re.split(r"[^A-Za-z0-9._-]", requirement, maxsplit=1)[0]
             try:
-                found[name] = metadata.version(name)
+                versions[name] = metadata.version(name)
             except metadata.PackageNotFoundError:
                 continue
-        return found
+        return versions
 
     def installed(self) -> dict[str, str]:
         """Versions of the libraries this engine runs on."""
