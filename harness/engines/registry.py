@@ -18,7 +18,13 @@ REFERENCE = "dh:numpy"
 
 @dataclass(frozen=True)
 class Registered:
-    """One entry point: its adapter class, or why it could not be imported."""
+    """One entry point.
+
+    Attributes:
+        name: source name.
+        adapter: the adapter class; None if it could not be imported.
+        problem: why it could not be imported; empty if it could.
+    """
 
     name: str
     adapter: type[Engine] | None
@@ -48,7 +54,12 @@ def registered() -> dict[str, Registered]:
 
 
 def adapter_of(source: str) -> type[Engine]:
-    """Adapter class of a source name. Raises InputError if unknown, EngineUnavailable if its adapter is broken."""
+    """Adapter class of a source name.
+
+    Raises:
+        InputError: there is no such source.
+        EngineUnavailable: its adapter cannot be imported.
+    """
     known = registered()
     if source not in known:
         raise InputError(f"no source {source!r}; {nearest(source, known)}")
@@ -59,12 +70,22 @@ def adapter_of(source: str) -> type[Engine]:
 
 
 def kind_of(source: str) -> str:
-    """Kind of description a source computes from: `urdf`, or `dh`, which a command without a prefix is taken for."""
+    """Kind of description a source computes from: `urdf` if its name starts so, else `dh`."""
     return "urdf" if source.startswith("urdf:") else "dh"
 
 
 def description_of(source: str, model: RobotModel, takes: str = "") -> Description:
-    """What an engine of this name is given. Raises DescriptionUnavailable or EngineUnavailable if the model has none."""
+    """What a source is given: the model's table, its URDF, or the name of a robot that the library ships.
+
+    Args:
+        source: source name.
+        model: the robot model.
+        takes: what the adapter takes, see `Engine.takes`.
+
+    Raises:
+        DescriptionUnavailable: it reads a URDF, and the model has none.
+        EngineUnavailable: it takes a packaged robot, and frames.toml names none for it.
+    """
     if takes == "packaged":
         names = model.engine_names.get(source)
         if names is None or names.robot is None:
