@@ -28,7 +28,6 @@ from harness.description.locate import default_models_dir, find_model
 from harness.description.model import RobotModel, load_model
 from harness.engines.dh_numpy import DHNumpy
 from harness.engines.dh_pinocchio import DHPinocchio
-from harness.engines.registry import load_engine
 from harness.run.binding import bind
 from harness.run.certifying import certify_all
 from harness.run.options import Options
@@ -150,7 +149,7 @@ def certificate_rows() -> list[tuple[str, float, float, str]]:
     for robot, count in (("ur5", 729), ("panda", 2187)):
         model = load_model(find_model(robot, default_models_dir()))
         spent: list[float] = []
-        bound = [bind(load_engine(name, model), model, {}) for name in ("dh:numpy", "dh:pinocchio")]
+        bound = [bind(adapter(model.table), model, {}) for adapter in (DHNumpy, DHPinocchio)]
         nodes = grid(joint_axes(model))
         if len(nodes) != count:
             raise RuntimeError(f"expected {count} grid points, got {len(nodes)}")

@@ -14,6 +14,10 @@ from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
 
+# What is asked of every source's placements, in a run and by `crosscheck worker-check` alike:
+RIGID = 1e-6  # the largest entry of R'R - I, or error of the last row 0 0 0 1, of a rigid transform
+REPEATED = 1e-9  # the largest change of an entry when it is asked for again: batches round differently from single rows
+
 QUARTER_TURN = math.pi / 2
 _CHORD = 2.0 * math.sqrt(2.0)  # of half a turn
 

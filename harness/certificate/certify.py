@@ -32,8 +32,13 @@ UNIT_ROUNDOFF = 2.0**-53
 
 @dataclass(frozen=True)
 class Sampled:
-    """One engine on the grid. values: (M, F, 4, 3). residual: largest entry by which the engine differs from its own
-    interpolant at random configurations; limit: what rounding explains, (1 + Lebesgue constant) times that of one value."""
+    """One engine on the grid of M nodes.
+
+    Attributes:
+        values: placements (M, F, 4, 3), as `Evaluate` gives them.
+        residual: the largest entry by which the engine differs from its own interpolant at random configurations [m or 1].
+        limit: what rounding explains of it: (1 + Lebesgue constant) times the rounding of one value.
+    """
 
     values: Array
     residual: float
@@ -47,7 +52,13 @@ class Sampled:
 
 @dataclass(frozen=True)
 class Bounds:
-    """Proven upper bounds for each frame (F,), position [m] and rotation [rad], and which bound the position's is."""
+    """Proven upper bounds on the discrepancies of two sources.
+
+    Attributes:
+        position: for each frame, (F,) [m].
+        rotation: for each frame, (F,) [rad].
+        method: for each frame, which bound the position's is: `kernel`, `coefficients` or `links`.
+    """
 
     position: Array
     rotation: Array
@@ -59,6 +70,10 @@ def rounding_of(joints: int, reach: float) -> float:
 
     A product of n + 2 rigid factors commits at most gamma_4 = 4u per multiplication on entries bounded by 1 and the reach
     (Higham, "Accuracy and Stability", section 3.5); the factor 4 above that covers sines, node positions and offsets.
+
+    Args:
+        joints: number of joints n.
+        reach: the largest distance of a frame from the base [m].
     """
     return 16.0 * (joints + 2) * UNIT_ROUNDOFF * (1.0 + reach)
 
@@ -90,7 +105,13 @@ def within(residual: float, limit: float) -> bool:
 
 
 def sample(evaluate: Evaluate, axes: list[Axis], rng: np.random.Generator) -> Sampled:
-    """Evaluate an engine on the grid, and test the premise at random configurations."""
+    """Evaluate an engine on the grid, and test the premise at random configurations.
+
+    Args:
+        evaluate: the engine.
+        axes: how its placements depend on each joint.
+        rng: draws the random configurations.
+    """
     values = evaluate(grid(axes))
     q = probes(axes, rng)
     with np.errstate(invalid="ignore", over="ignore"):
@@ -104,6 +125,11 @@ def certify(a: Sampled, b: Sampled, axes: list[Axis]) -> Bounds:
     """Upper bounds on |D(q)| over every q, D = a - b, from the grid values of two sources whose premise holds.
 
     Rounding: interpolating values that are off by r misses by (1 + Lebesgue constant) r at most, and is added.
+
+    Args:
+        a: one source on the grid, at F frames.
+        b: the other, on the same grid, at the same frames.
+        axes: how placements depend on each joint.
     """
     D, allowance = a.values - b.values, a.limit + b.limit
     position, method = sup_bound(axes, D[:, :, 3], allowance)
@@ -112,9 +138,15 @@ def certify(a: Sampled, b: Sampled, axes: list[Axis]) -> Bounds:
 
 
 def sup_bound(axes: list[Axis], values: Array, allowance: float) -> tuple[Array, NDArray[np.str_]]:
-    """The smaller of both bounds on an interpolant's norm over every q, and which it is.
+    """The smaller of both bounds on an interpolant's norm over every q.
 
-    values: (M, ..., d) on the grid; allowance: rounding of each of the d entries, added. Returns (...) twice.
+    Args:
+        axes: how the values depend on each joint.
+        values: d-vectors on the grid, (M, ..., d).
+        allowance: rounding of each of the d entries, which is added.
+
+    Returns:
+        The bounds (...), and which one each is (...): `kernel` or `coefficients`.
     """
     kernel = lebesgue(axes) * _norm(values).max(axis=0)
     coefficients = coefficient_sum(axes, values)
@@ -131,9 +163,17 @@ def tighter(a: Bounds, b: Bounds) -> Bounds:
 def ascend(difference: Evaluate, axes: list[Axis], starts: Array, frames: Indices, parts: Indices) -> Array:
     """Climb from each start to a local maximum of its discrepancy, joint by joint.
 
-    difference: q (K, n) to D (K, F, 4, 3). starts: (S, n), each with the frame and the part (0 position, 1 rotation) it is
-    to maximise, (S,). Along one joint D is known exactly from as many values as it has nodes, so each step looks at the
-    whole circle. Returns the configurations, (S, n).
+    Along one joint D is known exactly from as many values as it has nodes, so each step looks at the whole circle.
+
+    Args:
+        difference: q (K, n) to D (K, F, 4, 3).
+        axes: how D depends on each joint.
+        starts: configurations (S, n) [rad or m].
+        frames: index of the frame that each start is to maximise, (S,).
+        parts: 0 to maximise its position, 1 its rotation, (S,).
+
+    Returns:
+        The configurations reached, (S, n) [rad or m].
     """
     q = starts.copy()
     each = np.arange(len(q))
@@ -153,8 +193,15 @@ def ascend(difference: Evaluate, axes: list[Axis], starts: Array, frames: Indice
 def found_from(difference: Evaluate, interpolant: Evaluate, axes: list[Axis], starts: Array, floor: float) -> tuple[Array, Array]:
     """Largest discrepancies found by climbing from the best of some configurations, checked on the engines themselves.
 
-    starts: (S, n). Frames whose discrepancy is below `floor` (rounding) are not climbed. Returns position [m] and rotation
-    [rad], (F,).
+    Args:
+        difference: q (K, n) to D (K, F, 4, 3), by the engines.
+        interpolant: the same, by their interpolants, which are faster.
+        axes: how D depends on each joint.
+        starts: configurations to begin at, (S, n) [rad or m].
+        floor: rounding; frames with a discrepancy below it are not climbed.
+
+    Returns:
+        For each frame position [m] and rotation [rad], (F,) each.
     """
     D = difference(starts)
     F = D.shape[1]

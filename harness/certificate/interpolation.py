@@ -19,13 +19,18 @@ from harness.se3 import Array
 
 Complex: TypeAlias = NDArray[np.complex128]
 
+GRID_LIMIT = 4096  # nodes of the largest grid on which an engine is evaluated
+
 
 @dataclass(frozen=True)
 class Axis:
     """How placements depend on one joint.
 
-    `periodic`: a trigonometric polynomial of `degree` with period `upper - lower`; else a polynomial of `degree` on
-    [lower, upper] (rad or m).
+    Attributes:
+        periodic: as a trigonometric polynomial with period `upper - lower`; if not, as a polynomial on [lower, upper].
+        degree: degree of that polynomial.
+        lower: lower end [rad or m].
+        upper: upper end [rad or m].
     """
 
     periodic: bool
@@ -64,7 +69,14 @@ class Axis:
         return np.asarray(np.linalg.inv(self._basis(self.nodes)))
 
     def weights(self, q: Array) -> Array:
-        """Cardinal functions at q: value(q) = weights(q) @ values at the nodes. (...,) -> (..., count)."""
+        """Cardinal functions: value(q) = weights(q) @ values at the nodes.
+
+        Args:
+            q: values of the joint (...,) [rad or m].
+
+        Returns:
+            Weights of the nodes (..., count).
+        """
         return np.asarray((self._basis(q) @ self.analysis).real)
 
     @property
@@ -88,7 +100,15 @@ def grid(axes: list[Axis]) -> Array:
 
 
 def weights(axes: list[Axis], q: Array) -> Array:
-    """Tensor-product cardinal functions at q (K, n): (K, product of counts), matching the order of `grid`."""
+    """Tensor-product cardinal functions: value(q) = weights(q) @ values on the grid.
+
+    Args:
+        axes: how the values depend on each joint.
+        q: configurations (K, n) [rad or m].
+
+    Returns:
+        Weights of the nodes (K, product of counts), in the order of `grid`.
+    """
     out = np.ones((q.shape[0], 1))
     for i, axis in enumerate(axes):
         out = (out[:, :, None] * axis.weights(q[:, i])[:, None, :]).reshape(q.shape[0], -1)
@@ -98,9 +118,16 @@ def weights(axes: list[Axis], q: Array) -> Array:
 def coefficient_sum(axes: list[Axis], values: Array) -> Array:
     """Bound on the sup norm of an interpolant over every configuration, from the sizes of its coefficients.
 
-    values: (product of counts, ..., d), a real d-vector per grid point. Returns (...). Values being real, coefficients come
-    in conjugate pairs, and c e^(ix) + conj = 2 (Re c cos x - Im c sin x) is at most twice the largest singular value of
-    [Re c, Im c] (the ellipse's half axis; |c| itself would be up to sqrt 2 more). Every T_k is at most 1.
+    Values are real, so coefficients come in conjugate pairs, and c e^(ix) + conj = 2 (Re c cos x - Im c sin x) is at most
+    twice the largest singular value of [Re c, Im c] (the ellipse's half axis; |c| itself would be up to sqrt 2 more). Every
+    T_k is at most 1.
+
+    Args:
+        axes: how the values depend on each joint.
+        values: a real d-vector for each grid point, (product of counts, ..., d).
+
+    Returns:
+        The bounds (...).
     """
     shape = tuple(axis.count for axis in axes)
     c: Complex = values.reshape(*shape, *values.shape[1:]).astype(np.complex128)

@@ -29,7 +29,13 @@ from harness.se3 import Array, chord_angle
 
 @dataclass(frozen=True)
 class Link:
-    """Frame `child` seen from frame `parent` (indices; None: the base), which depends on `joints` alone."""
+    """One frame seen from another, which depends on a few joints alone.
+
+    Attributes:
+        parent: index of the frame it is seen from; None for the base.
+        child: index of the frame.
+        joints: indices of the joints.
+    """
 
     parent: int | None
     child: int
@@ -38,7 +44,13 @@ class Link:
 
 @dataclass(frozen=True)
 class SampledLinks:
-    """One engine, link by link. values: for each link (M_link, 4, 3); residual and limit as in `Sampled`."""
+    """One engine, link by link.
+
+    Attributes:
+        values: for each link its placements (M_link, 4, 3) on the link's own grid.
+        residual: see `Sampled`.
+        limit: see `Sampled`.
+    """
 
     values: tuple[Array, ...]
     residual: float
@@ -51,7 +63,16 @@ class SampledLinks:
 
 
 def sample_links(evaluate: Evaluate, axes: list[Axis], links: list[Link], rng: np.random.Generator) -> SampledLinks:
-    """Evaluate every link at its own joints' nodes, all others at a random place, and test it at random configurations."""
+    """Evaluate an engine at every link's own nodes, and test the premise at random configurations.
+
+    All joints that a link does not depend on stand at one random place.
+
+    Args:
+        evaluate: the engine.
+        axes: how its placements depend on each joint.
+        links: the links.
+        rng: draws the random configurations.
+    """
     rest = np.array([rng.uniform(axis.lower, axis.upper) for axis in axes])
     blocks = []
     for link in links:
@@ -77,7 +98,15 @@ def sample_links(evaluate: Evaluate, axes: list[Axis], links: list[Link], rng: n
 
 
 def certify_links(a: SampledLinks, b: SampledLinks, axes: list[Axis], links: list[Link], frames: int) -> Bounds:
-    """Upper bounds at every frame, composed along the chain; see the module. `b` is the one whose reach is used."""
+    """Upper bounds at every frame, composed along the chain; see the module.
+
+    Args:
+        a: one source, link by link.
+        b: the other; its reach is used.
+        axes: how placements depend on each joint.
+        links: the links, from the base to every frame.
+        frames: number of frames.
+    """
     position, chord = np.full(frames, np.inf), np.full(frames, np.inf)
     by_child = {link.child: i for i, link in enumerate(links)}
     parts = [_link_bounds(a.values[i], b.values[i], axes, link, a.limit + b.limit) for i, link in enumerate(links)]

@@ -18,23 +18,25 @@ from harness.comparison.components import (
     rotation_residual,
 )
 from harness.comparison.statistics import Stream
-from harness.se3 import Array
+from harness.se3 import REPEATED, RIGID, Array
 
 Mask: TypeAlias = NDArray[np.bool_]
 
 CHUNK = 1024
-VALID = 1e-6
-SAME = 1e-9  # batches round differently from single configurations, float32 origins and all
 HUGE = 1e100  # beyond this a length is as good as infinite: its square would be
 
 
 @dataclass(kw_only=True)
 class Validity:
-    """Whether a source's placements are placements: finite, last row 0 0 0 1, rotation in SO(3) to within `VALID`.
+    """Whether a source's placements are placements: finite, last row 0 0 0 1, rotation in SO(3) to within `se3.RIGID`.
 
-    `residual` is the worst |R'R - I| kind of error seen (see `rotation_residual`); `first` is (configuration index, raw
-    frame index) of the first placement that failed. `again` is the largest difference between what the source answered for
-    configuration `again_at` and what it answers when asked for it again, alone.
+    Attributes:
+        checked: number of placements looked at.
+        invalid: number of those that are no placements.
+        residual: the largest error of a rotation, see `rotation_residual` [1].
+        first: (configuration index, raw frame index) of the first one that is no placement; None if all are.
+        again: the largest change of an entry when one configuration is asked for a second time, alone.
+        again_at: index of that configuration; -1 if none was asked for again.
     """
 
     checked: int = 0
@@ -47,12 +49,19 @@ class Validity:
     @property
     def stateful(self) -> bool:
         """Whether the answer depends on what was asked before, by more than rounding does."""
-        return self.again > SAME
+        return self.again > REPEATED
 
 
 @dataclass
 class Pair:
-    """Largest discrepancies of two sources over the subset: [m] and [rad], each with its frame's index."""
+    """Largest discrepancies of two sources over the subset.
+
+    Attributes:
+        position: the largest distance [m].
+        position_frame: index of the mapped frame that shows it; -1 as long as nothing was compared.
+        rotation: the largest angle [rad].
+        rotation_frame: index of the mapped frame that shows it; -1 as long as nothing was compared.
+    """
 
     position: float = 0.0
     position_frame: int = -1
@@ -61,10 +70,18 @@ class Pair:
 
 
 class Comparison:
-    """Accumulates the comparison of several sources.
+    """Accumulates the comparison of several sources, block by block.
 
-    views: how each source's raw placements are read; `frames` counts the mapped frames. All pairs of sources are
-    compared on the configurations with index below `subset`.
+    Attributes:
+        views: by source, how its raw placements are read.
+        reference: the source that all others are compared with.
+        frames: number of mapped frames.
+        subset: all pairs of sources are compared too, on the configurations with an index below this one.
+        reach: the largest distance of a mapped frame from the base, by the reference [m].
+        validity: by source, whether its placements are placements.
+        position: by source, statistics of the distance from the reference [m], at each mapped frame.
+        rotation: by source, statistics of the angle from the reference [rad], at each mapped frame.
+        pairs: by pair of sources, the largest discrepancies over the subset.
     """
 
     def __init__(self, views: Mapping[str, View], reference: str, frames: int, subset: int) -> None:
@@ -90,7 +107,12 @@ class Comparison:
         self.pairs = {pair: value for pair, value in self.pairs.items() if source not in pair}
 
     def update(self, start: int, raw: Mapping[str, Array]) -> None:
-        """Compare configurations `start` ...: raw placements (N, F_raw, 4, 4) of every source still in `views`."""
+        """Compare one block of configurations.
+
+        Args:
+            start: index of the block's first configuration.
+            raw: by source in `views`, its raw placements (N, F_raw, 4, 4) [m].
+        """
         count = raw[self.reference].shape[0]
         # An engine may return anything: what is not finite is masked and counted, not warned about.
         with np.errstate(invalid="ignore", over="ignore"):
@@ -121,12 +143,12 @@ class Comparison:
         residual = rotation_residual(C)
         worst = float(residual.max(initial=0.0))
         last_row_ok = bool(np.array_equal(T[:, :, 3, :], np.broadcast_to([0.0, 0.0, 0.0, 1.0], (*T.shape[:2], 4))))
-        if worst <= VALID and last_row_ok and np.abs(C[:, 3]).max(initial=0.0) < HUGE:
+        if worst <= RIGID and last_row_ok and np.abs(C[:, 3]).max(initial=0.0) < HUGE:
             validity.residual = max(validity.residual, worst)
             return None
         finite: Mask = np.asarray((np.abs(C) < HUGE).all(axis=(1, 2)))
         last = np.abs(T[:, :, 3, :] - [0.0, 0.0, 0.0, 1.0]).max(axis=2).T
-        good = finite & (residual <= VALID) & (last <= VALID)
+        good = finite & (residual <= RIGID) & (last <= RIGID)
         validity.residual = max(validity.residual, float(np.where(finite, residual, 0.0).max(initial=0.0)))
         bad = np.argwhere(~good.T)
         validity.invalid += len(bad)
@@ -137,7 +159,7 @@ class Comparison:
     @staticmethod
     def _usable(finite: Mask, view: View) -> Mask:
         """Mask of mapped frames whose raw placement, and base, is finite: an invalid but finite one is still measured."""
-        mask: Mask = finite[view.picked]
+        mask: Mask = finite[view.raw_frames]
         return mask if view.base is None else np.logical_and(mask, finite[view.base])
 
     def _common(
@@ -183,13 +205,32 @@ class Comparison:
                         setattr(pair, f"{name}_frame", frames[worst])
 
     def worst(self, source: str, tolerance: tuple[float, float], frames: Sequence[int]) -> tuple[int, int] | None:
-        """(frame, configuration index) furthest outside tolerance (m, rad) among `frames`, None if all are inside."""
+        """Where a source is furthest outside its tolerance.
+
+        Args:
+            source: source name.
+            tolerance: [m], [rad].
+            frames: indices of the mapped frames that are looked at.
+
+        Returns:
+            (frame, configuration index); None if all are within tolerance.
+        """
         return self.furthest(source, tolerance, frames, 1.0)
 
     def furthest(
         self, source: str, tolerance: tuple[float, float], frames: Sequence[int], above: float = -1.0
     ) -> tuple[int, int] | None:
-        """(frame, configuration index) with the largest discrepancy, in parts of the tolerance and `above` so many of them."""
+        """Where a source's discrepancy is the largest, divided by its tolerance.
+
+        Args:
+            source: source name.
+            tolerance: [m], [rad].
+            frames: indices of the mapped frames that are looked at.
+            above: only discrepancies larger than this many tolerances count.
+
+        Returns:
+            (frame, configuration index); None if there is none.
+        """
         best, where = above, None
         for stream, limit in ((self.position[source], tolerance[0]), (self.rotation[source], tolerance[1])):
             for frame in frames:

@@ -20,8 +20,9 @@ Components: TypeAlias = Array
 class View:
     """How mapped frames are read off one source's raw placements.
 
-    slots: (F,) index of the raw frame of each mapped frame, None if the source does not have it; offsets: (F, 4, 4)
-    constant transform behind it; base: raw frame in which placements are to be expressed, None if they already are;
+    slots: (F,) index of the raw frame of each mapped frame, None if the source does not have it.
+    offsets: (F, 4, 4) constant transform that follows the raw frame.
+    base: index of the raw frame in which placements are to be expressed, None if they already are.
     front: (4, 4) constant transform before it all, T_base_raw, None if it is the identity.
     """
 
@@ -36,8 +37,8 @@ class View:
         return [f for f, slot in enumerate(self.slots) if slot is not None]
 
     @property
-    def picked(self) -> list[int]:
-        """Indices of the raw frames they are read from, in the same order."""
+    def raw_frames(self) -> list[int]:
+        """Index of the raw frame of each mapped frame this source has, in the order of `available`."""
         return [slot for slot in self.slots if slot is not None]
 
 
@@ -64,7 +65,7 @@ def mapped(C: Components, view: View) -> Components:
     if view.front is not None:
         raw = np.einsum("ri,fkin->fkrn", view.front[:3, :3], raw)
         raw[:, 3] += view.front[:3, 3, None]
-    picked = raw[view.picked]
+    picked = raw[view.raw_frames]
     F, _, _, N = picked.shape
     # Columns of T X are combinations of the columns of T: a (4 x 4) by (4 x 3N) product a frame.
     out = np.matmul(view.offsets[available].transpose(0, 2, 1), picked.reshape(F, 4, 3 * N))

@@ -14,7 +14,7 @@ from harness.description.urdf import MOVABLE, UNSUPPORTED, Urdf, UrdfJoint
 from harness.engines import requirements
 from harness.engines.dh_numpy import DHNumpy
 from harness.engines.registry import adapter_of
-from harness.errors import EngineFailed, InputError, UrdfError, nearest
+from harness.errors import EngineFailed, InputError, UrdfError
 from harness.kinematics.canonical import canonical
 from harness.kinematics.screws import screws
 from harness.se3 import Array
@@ -52,8 +52,7 @@ def derive(urdf: Urdf, base: str, tip: str, convention: Convention, source: str)
     if not source.startswith("urdf:"):
         raise InputError(f"expected a source that reads a URDF, got {source!r}", key="--source")
     for option, link in (("--base", base), ("--tip", tip)):
-        if link not in urdf.links:
-            raise InputError(f"no link {link!r} in {urdf.path.name}; {nearest(link, urdf.links)}", key=option)
+        urdf.require_link(link, option)
     path = urdf.between(base, tip)
     joints = _chain_joints(urdf, path, base, tip)
     place = _placer(urdf, [joint.name for joint in joints], base, source)

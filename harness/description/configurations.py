@@ -50,7 +50,14 @@ class ConfigurationsFile(Strict):
 
 @dataclass(frozen=True)
 class Configuration:
-    """One fixed configuration: q (n,) [rad or m] and what is published about it."""
+    """One fixed configuration.
+
+    Attributes:
+        name: its name, as in reports.
+        q: joint values (n,) [rad or m], in the model's order.
+        provenance: where it comes from.
+        published: what is published about it.
+    """
 
     name: str
     q: Array
@@ -60,7 +67,14 @@ class Configuration:
 
 @dataclass(frozen=True)
 class ConfigurationSet:
-    """Fixed configurations and the law of the random ones. Index 0 ... len(fixed) - 1 is fixed, beyond is random."""
+    """Fixed configurations, and the law of the random ones. Index 0 ... len(fixed) - 1 is fixed, beyond is random.
+
+    Attributes:
+        fixed: the fixed configurations.
+        lower: lower ends of the random ranges (n,) [rad or m].
+        upper: upper ends of the random ranges (n,) [rad or m].
+        revolute: whether each joint is revolute, (n,).
+    """
 
     fixed: tuple[Configuration, ...]
     lower: Array
@@ -69,14 +83,22 @@ class ConfigurationSet:
 
     @cached_property
     def fixed_q(self) -> Array:
-        """(len(fixed), n)."""
+        """Joint values of the fixed configurations, (len(fixed), n) [rad or m]."""
         return np.array([c.q for c in self.fixed]).reshape(len(self.fixed), len(self.lower))
 
     def random(self, seed: int, start: int, count: int) -> Array:
-        """Random configurations `start` ... `start + count - 1` of this seed, (count, n).
+        """Random configurations of one seed, uniform within the ranges.
 
-        Drawn from Philox (Salmon et al. 2011) keyed by seed and chunk number, so each chunk stands alone. Only the raw
-        64-bit stream is used: NumPy guarantees that one never changes.
+        They are drawn from Philox (Salmon et al. 2011), keyed by seed and chunk number, so each chunk stands alone. Only the
+        raw 64-bit stream is used: NumPy guarantees that it never changes.
+
+        Args:
+            seed: the seed, below 2^64.
+            start: number of the first; the first random configuration of all is 0.
+            count: how many.
+
+        Returns:
+            Joint values (count, n) [rad or m].
         """
         n = len(self.lower)
         first, last = start // CHUNK, (start + count + CHUNK - 1) // CHUNK
@@ -100,7 +122,7 @@ class ConfigurationSet:
         return q
 
     def block(self, seed: int, start: int, stop: int) -> Array:
-        """Configurations by index, fixed then random, (stop - start, n)."""
+        """Configurations `start` ... `stop - 1` by index, fixed then random, (stop - start, n) [rad or m]."""
         k = len(self.fixed)
         head = self.fixed_q[start : min(stop, k)]
         first = max(start, k)
@@ -118,7 +140,17 @@ class ConfigurationSet:
 def resolve_configurations(
     file: ConfigurationsFile, table: DHTable, limits: dict[str, tuple[float, float]], path: Path
 ) -> ConfigurationSet:
-    """Check the entries against the table and add the standard ones. Raises ModelFileError."""
+    """Check the entries against the table, and add zero and each joint alone.
+
+    Args:
+        file: configurations.toml as written.
+        table: the DH table.
+        limits: (lower, upper) [rad or m] of the joints that have limits, by name.
+        path: configurations.toml, for messages.
+
+    Raises:
+        ModelFileError: an entry does not fit the table, or a prismatic joint has no range.
+    """
     ranges = _ranges(file.random, table, limits, path)
     fixed = [Configuration("zero", np.zeros(len(table.joints)))]
     for i, entry in enumerate(file.configuration):

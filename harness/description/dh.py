@@ -17,6 +17,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from harness import se3
+from harness.errors import nearest
 
 Convention: TypeAlias = Literal["standard", "modified"]
 Kind: TypeAlias = Literal["revolute", "prismatic", "fixed"]
@@ -24,7 +25,16 @@ Kind: TypeAlias = Literal["revolute", "prismatic", "fixed"]
 
 @dataclass(frozen=True, kw_only=True)
 class DHRow:
-    """One row: `a`, `d` [m], `alpha`, `theta` [rad]; theta (d, if prismatic) is the offset added to q."""
+    """One row of the table.
+
+    Attributes:
+        name: name of the joint, or of the row if it is fixed.
+        kind: revolute, prismatic or fixed.
+        a: length along x [m].
+        alpha: twist about x [rad].
+        d: distance along z [m]; of a prismatic row the offset added to q.
+        theta: angle about z [rad]; of a revolute row the offset added to q.
+    """
 
     name: str
     kind: Kind
@@ -35,7 +45,16 @@ class DHRow:
 
     @classmethod
     def of(cls, name: str, kind: Kind, numbers: Iterable[float]) -> DHRow:
-        """A row from its numbers in the order of the columns: a [m], alpha [rad], d [m], theta [rad]. Raises ValueError."""
+        """A row from its four numbers.
+
+        Args:
+            name: name of the joint or row.
+            kind: revolute, prismatic or fixed.
+            numbers: in the order of the columns: a [m], alpha [rad], d [m], theta [rad].
+
+        Raises:
+            ValueError: there are not four numbers.
+        """
         a, alpha, d, theta = (float(x) for x in numbers)
         return cls(name=name, kind=kind, a=a, alpha=alpha, d=d, theta=theta)
 
@@ -46,6 +65,12 @@ class DHTable:
 
     Frames are labelled `base` (where placements are expressed), `0` (after the base transform), `1` ... `n` (after each
     row, fixed rows included) and `tool` (after the tool transform).
+
+    Attributes:
+        rows: the rows, in order from the base.
+        convention: standard or modified.
+        base: T_base_0 (4, 4) [m].
+        tool: T_n_tool (4, 4) [m].
     """
 
     rows: tuple[DHRow, ...]
@@ -64,5 +89,12 @@ class DHTable:
         return ("base", *(str(i) for i in range(len(self.rows) + 1)), "tool")
 
     def kind(self, joint: str) -> Kind:
-        """Kind of the named joint. Raises KeyError."""
-        return next(row.kind for row in self.rows if row.name == joint)
+        """Kind of the named row.
+
+        Raises:
+            KeyError: there is no such row.
+        """
+        for row in self.rows:
+            if row.name == joint:
+                return row.kind
+        raise KeyError(f"no row {joint!r}; {nearest(joint, (row.name for row in self.rows))}")

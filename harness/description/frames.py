@@ -30,7 +30,13 @@ Relation = Literal["identical", "declared", "rigid"]
 class MappedFrame:
     """A frame under one name: `T_base_name = T_base_dh @ offset`, and the link `urdf` is the same frame.
 
-    `offset` is None for a rigid frame until it has been measured.
+    Attributes:
+        name: its name here and in reports.
+        dh: label of the DH frame it is on.
+        urdf: its link in the URDF; None if it is compared among DH sources only.
+        relation: how the offset is known: `identical` (there is none), `declared`, or `rigid` (it is measured).
+        of: the other entry that a declared offset was given from, if any.
+        offset: T_dh_name (4, 4) [m]; None for a rigid frame until it has been measured.
     """
 
     name: str
@@ -50,7 +56,18 @@ class FrameMap:
 
 
 def resolve_frames(file: FramesFile, table: DHTable, urdf: Urdf | None, path: Path) -> FrameMap:
-    """Check the entries against both descriptions. Raises MappingError naming the key and the nearest spelling."""
+    """Check the entries against both descriptions.
+
+    Args:
+        file: frames.toml as written.
+        table: the DH table.
+        urdf: the URDF, or None.
+        path: the file, for messages.
+
+    Raises:
+        MappingError: a name does not exist or is mapped twice, a joint would not be checked, or there is no base frame.
+            It names the key and the nearest spelling.
+    """
     by_name: dict[str, int] = {}
     taken: dict[tuple[str, str], int] = {}
     frames: list[MappedFrame] = []
@@ -76,14 +93,24 @@ def resolve_frames(file: FramesFile, table: DHTable, urdf: Urdf | None, path: Pa
 
 
 def unchecked_joint(frames: Iterable[MappedFrame], table: DHTable) -> str:
-    """The first joint behind the last of these frames, which none of them shows; empty if there is none."""
+    """The first joint that moves none of these frames; empty if every joint moves one."""
     last = max((table.frames.index(frame.dh) for frame in frames), default=-1)
     moving = ((i, row.name) for i, row in enumerate(table.rows, start=1) if row.kind != "fixed")
     return next((name for i, name in moving if table.frames.index(str(i)) > last), "")
 
 
 def reaches_every_joint(frames: Iterable[MappedFrame], table: DHTable, path: Path, key: str) -> None:
-    """Raise MappingError if a joint would never be checked."""
+    """Refuse a mapping in which a joint would never be checked.
+
+    Args:
+        frames: the mapped frames that are compared.
+        table: the DH table.
+        path: the file, for messages.
+        key: the key in it, for messages.
+
+    Raises:
+        MappingError: a joint moves none of the frames.
+    """
     if joint := unchecked_joint(frames, table):
         hint = "map a frame at the end of the chain"
         raise MappingError(f"no mapped frame moves with joint {joint!r}", where=path, key=key, hint=hint)

@@ -19,10 +19,14 @@ from harness.se3 import Array
 
 @dataclass(frozen=True, kw_only=True)
 class JointMap:
-    """Affine map from the model's q (N, n) to every movable joint of a description, by name.
+    """Affine map from the model's n joints to the m movable joints of a description: q_description = A q + b.
 
-    names: (m,) joint names; A: (m, n); b: (m,) [rad or m]. `followers` are mimic joints, whose rows are already
-    multiplier * leader + offset; `held` are joints that no model joint moves: they stay at zero.
+    Attributes:
+        names: the description's joints, (m,).
+        A: factors (m, n).
+        b: offsets (m,) [rad or m].
+        followers: those that mimic another. Their rows are multiplier * leader + offset already.
+        held: those that no model joint moves: they stay at zero.
     """
 
     names: tuple[str, ...]
@@ -49,7 +53,18 @@ class JointMap:
         )
 
     def values(self, q: Array, joints: tuple[str, ...]) -> Array:
-        """Values of the named joints, (N, len(joints)). Raises KeyError for a joint not in the map."""
+        """Values of some of the description's joints.
+
+        Args:
+            q: values of the model's joints (N, n) [rad or m].
+            joints: names in the description.
+
+        Returns:
+            Values (N, len(joints)) [rad or m].
+
+        Raises:
+            KeyError: a joint is not in the map.
+        """
         rows = [self.names.index(name) for name in joints if name in self.names]
         if len(rows) != len(joints):
             missing = next(name for name in joints if name not in self.names)
@@ -64,9 +79,18 @@ def identity_map(table: DHTable) -> JointMap:
 
 
 def resolve_joints(entries: Mapping[str, JointEntry], table: DHTable, urdf: Urdf, frames: FrameMap, path: Path) -> JointMap:
-    """Match model joints to URDF joints and check that the counts fit on the mapped chain.
+    """Match the model's joints to the URDF's, and check that both have the same joints on the mapped chain.
 
-    Raises MappingError (unknown, doubled or unmatched joints) or UrdfError (floating or planar on the chain).
+    Args:
+        entries: `[joints.NAME]` of frames.toml, by model joint.
+        table: the DH table.
+        urdf: the URDF.
+        frames: the mapping of frames, which says what the chain is.
+        path: frames.toml, for messages.
+
+    Raises:
+        MappingError: a joint is unknown, mapped twice, or has no partner.
+        UrdfError: a joint on the chain is floating or planar.
     """
     for name in entries:
         if name not in table.joints:
@@ -166,7 +190,13 @@ def leader_of(urdf: Urdf, joint: UrdfJoint) -> UrdfJoint:
 
 
 def complete(rows: Mapping[str, tuple[Array, float]], urdf: Urdf, n: int) -> JointMap:
-    """The map of n model joints whose rows (A, b) are given by URDF joint; held joints at zero, followers after their leader."""
+    """The map to all movable joints of a URDF.
+
+    Args:
+        rows: for each URDF joint that is driven its row of A, (n,), and its entry of b [rad or m].
+        urdf: the URDF; its followers follow their leader, all other joints stay at zero.
+        n: number of model joints.
+    """
 
     def row(joint: UrdfJoint) -> tuple[Array, float]:
         if joint.mimic is None:
@@ -186,9 +216,10 @@ def complete(rows: Mapping[str, tuple[Array, float]], urdf: Urdf, n: int) -> Joi
 
 
 def random_limits(table: DHTable, urdf: Urdf | None, joint_map: JointMap | None) -> dict[str, tuple[float, float]]:
-    """Range of each model joint for random draws, from the URDF limits where one URDF joint is that joint up to sign and zero.
+    """Range of each model joint for random draws, (lower, upper) [rad or m].
 
-    Revolute joints without limits get [-pi, pi]; prismatic ones are left out, since no range can be assumed.
+    It is the URDF's where a URDF joint is that joint up to sign and offset. Revolute joints without limits get [-pi, pi].
+    Prismatic ones without limits are not in the result: no range can be assumed.
     """
     ranges: dict[str, tuple[float, float]] = {}
     for i, name in enumerate(table.joints):

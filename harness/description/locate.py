@@ -70,6 +70,6 @@ def packaged_file(package: str, file: str, where: Path | None = None, key: str |
     matches = [f for f in files if PurePosixPath(str(f)).parts[-len(wanted) :] == wanted]
     if len(matches) != 1:
         urdfs = [str(f) for f in files if str(f).endswith(".urdf")]
-        found = f"{len(matches)} files end in it" if matches else nearest(file, urdfs)
-        raise ModelFileError(f"no such file {file!r} in {package}: {found}", where=where, key=key)
+        why = f"{len(matches)} files end in it" if matches else nearest(file, urdfs)
+        raise ModelFileError(f"no such file {file!r} in {package}: {why}", where=where, key=key)
     return Path(str(matches[0].locate())).resolve()

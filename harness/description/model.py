@@ -31,7 +31,7 @@ RESERVED = ("index", "report.schema")
 
 
 class Provenance(Strict):
-    """Where the numbers of dh.csv come from."""
+    """Where the numbers of dh.csv come from: document, page, date of the document, and a note."""
 
     document: str = Field(min_length=1)
     page: str = ""
@@ -40,17 +40,26 @@ class Provenance(Strict):
 
 
 class Tolerance(Strict):
-    """Largest discrepancy that counts as agreement: `position` [m], `rotation` [rad]."""
+    """Largest discrepancy that counts as agreement.
+
+    Attributes:
+        position: distance of origins [m].
+        rotation: angle between orientations [rad].
+    """
 
     position: Number = Field(gt=0)
     rotation: Number = Field(gt=0)
 
 
 class SourceEntry(Strict):
-    """One `[[source]]`: a required one must run; any one that runs must agree.
+    """One `[[source]]`. Any source that runs must agree.
 
-    `command`: a program of the user's that speaks the worker protocol, run in the model's folder; `{model}` in it is that
-    folder. Its description is the URDF if the name begins with `urdf:`, else the DH table.
+    Attributes:
+        name: source name, such as `urdf:pinocchio`, or a name of the user's for a command.
+        required: whether it must run.
+        tolerance: its own tolerance, if it is not the model's.
+        command: a program of the user's that speaks the worker protocol, run in the model's folder. `{model}` in it is that
+            folder. It is given the URDF if the name begins with `urdf:`, else the DH table.
     """
 
     name: SourceName = Field(pattern=r"^[A-Za-z][^\s\"]*$")
@@ -66,11 +75,17 @@ class SourceEntry(Strict):
 
 
 class AcceptedEntry(Strict):
-    """One `[[accepted]]` deviation: for each source and frame the largest discrepancy, right to within `within` (relative).
+    """One `[[accepted]]` deviation: the largest discrepancy of each of its sources at each of its frames.
 
-    `source` may be a pattern such as `urdf:*`: what is wrong in the URDF is wrong in every engine. `position` [m] or
-    `rotation` [rad] left out means: that part must be below tolerance. `cause`: the numbers that explain it, joint, then
-    parameter, then the change that repairs it [m or rad]; an explanation by anything else, or by more, is a change.
+    Attributes:
+        source: one or more sources. A pattern such as `urdf:*` is allowed: what is wrong in the URDF is wrong in every engine.
+        frame: one or more mapped frames.
+        position: largest discrepancy [m]; 0 means that the position must be within tolerance.
+        rotation: largest discrepancy [rad]; 0 means that the rotation must be within tolerance.
+        within: how far `position` and `rotation` may be off, as a part of themselves.
+        cause: the numbers that explain it: joint, then parameter, then the change that repairs it [m or rad]. An explanation
+            by anything else, or by more, means that the deviation has changed.
+        reason: why it is accepted.
     """
 
     source: SourceName | list[SourceName]
@@ -103,7 +118,12 @@ class AcceptedEntry(Strict):
 
 
 class UrdfEntry(Strict):
-    """`[urdf]`: `file` under urdf/, or `package` (an installed distribution) and `file` inside it."""
+    """`[urdf]`: where the URDF is.
+
+    Attributes:
+        file: a file under urdf/, or inside `package`.
+        package: an installed distribution; None for a file under urdf/.
+    """
 
     file: str = Field(min_length=1)
     package: str | None = None
@@ -134,7 +154,21 @@ class ModelFile(Strict):
 
 @dataclass(frozen=True, kw_only=True)
 class RobotModel:
-    """A robot model, read and checked against itself."""
+    """A robot model, read and checked against itself.
+
+    Attributes:
+        folder: where it was read.
+        file: model.toml.
+        table: the DH table, base and tool transform included.
+        urdf: the URDF; None if the model has none.
+        frames: the mapping of frames.
+        urdf_joints: the map from the model's joints to the URDF's; None without a URDF.
+        engine_names: by source, what one engine calls things.
+        configurations: the configurations it is checked at.
+        findings: what the lint says of the URDF.
+        suspects: numbers in dh.csv that look cut short, or like degrees.
+        hashes: SHA-256 of each file that was read, by name.
+    """
 
     folder: Path
     file: ModelFile
@@ -154,13 +188,13 @@ class RobotModel:
         return self.file.name
 
     def joint_map(self, kind: str) -> JointMap:
-        """Map from model joints to those of the description kind, `dh` or `urdf`."""
+        """Map from the model's joints to those of a kind of description, `dh` or `urdf`."""
         if kind == "urdf" and self.urdf_joints is not None:
             return self.urdf_joints
         return identity_map(self.table)
 
     def unmapped(self) -> tuple[list[str], list[str]]:
-        """DH frames and chain links that no entry maps: nothing is checked there."""
+        """DH frames, and links of the chain, that no entry maps: nothing is checked there."""
         mapped_dh = {f.dh for f in self.frames.frames}
         same_as_base = {"base"} if "0" in mapped_dh and np.array_equal(self.table.base, np.eye(4)) else set()
         if np.array_equal(self.table.tool, np.eye(4)):
@@ -180,7 +214,11 @@ class RobotModel:
 def load_model(folder: Path) -> RobotModel:
     """Read and validate one robot model folder.
 
-    Raises ModelFileError, MappingError, UrdfError (wrong input) or DescriptionUnavailable (data package not installed).
+    Raises:
+        ModelFileError: a file is absent, or wrong.
+        MappingError: frames.toml does not fit the table or the URDF.
+        UrdfError: the URDF cannot be read, or is no kinematic tree.
+        DescriptionUnavailable: the package that has the URDF is not installed.
     """
     if not folder.is_dir():
         raise ModelFileError("no such robot model folder", where=folder)

@@ -18,9 +18,20 @@ Row = list[Number]
 class PublishedEntry(Strict):
     """One `[[configuration.published]]`: where a frame is said to be.
 
-    `dh` is a DH frame label, `relative_to` another (default: base). The placement is `matrix` (3 or 4 rows of 4) or
-    `position` with, optionally, `rotation` (3x3) or `rpy` (in the configuration's unit). `tolerance` applies to metres
-    and `rotation_tolerance` to radians; `status` says whether the claim holds, `reason` why it does not.
+    The placement is `matrix`, or `position` alone or with `rotation` or `rpy`.
+
+    Attributes:
+        dh: label of the DH frame.
+        relative_to: label of the DH frame in which the placement is given.
+        matrix: 3 or 4 rows of 4 numbers [m].
+        position: (3,) [m].
+        rotation: 3 rows of 3 numbers.
+        rpy: roll, pitch, yaw (3,), in the configuration's unit.
+        tolerance: largest error of any entry of the position [m].
+        rotation_tolerance: largest error of any entry of the rotation; the same number as `tolerance` if it is left out.
+        provenance: where it is published.
+        status: whether the claim is known to hold.
+        reason: why a wrong one is wrong.
     """
 
     dh: int | str
@@ -53,7 +64,19 @@ class PublishedEntry(Strict):
 
 @dataclass(frozen=True, kw_only=True)
 class Published:
-    """A claim in radians and metres: `position` (3,), `rotation` (3, 3) or None if only a position is claimed."""
+    """A claim in radians and metres.
+
+    Attributes:
+        dh: label of the DH frame.
+        relative_to: label of the DH frame in which the placement is given.
+        position: (3,) [m].
+        rotation: (3, 3); None if only a position is claimed.
+        tolerance: largest error of any entry of the position [m].
+        rotation_tolerance: largest error of any entry of the rotation [1].
+        provenance: where it is published.
+        status: whether the claim is known to hold.
+        reason: why a wrong one is wrong.
+    """
 
     dh: str
     relative_to: str
@@ -67,7 +90,14 @@ class Published:
 
     @classmethod
     def from_entry(cls, entry: PublishedEntry, unit: Literal["rad", "deg"]) -> Published:
-        """Convert from the file's unit. A matrix need not be a rotation: a wrong claim is kept as it was printed."""
+        """Convert from the file's unit.
+
+        A matrix need not hold a rotation: a wrong claim is kept as it was printed.
+
+        Args:
+            entry: the claim as written.
+            unit: unit of the configuration's angles, and so of `entry.rpy`.
+        """
         rotation = None if entry.rotation is None else np.array(entry.rotation)
         if entry.matrix is not None:
             matrix = np.array(entry.matrix)

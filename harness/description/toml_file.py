@@ -92,9 +92,9 @@ def _model_in(annotation: Any) -> Any:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     for inner in get_args(annotation):
-        found = _model_in(inner)
-        if isinstance(found, type) and issubclass(found, BaseModel):
-            return found
+        table = _model_in(inner)
+        if isinstance(table, type) and issubclass(table, BaseModel):
+            return table
     return annotation
 
 

@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
-from harness.errors import UrdfError, nearest
+from harness.errors import InputError, UrdfError, nearest
 
 MOVABLE = ("revolute", "continuous", "prismatic")
 UNSUPPORTED = ("floating", "planar")
@@ -24,7 +24,21 @@ class Mimic(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class UrdfJoint:
-    """One joint as written; `axis` is None if the file has none, `texts` holds the numbers as text for the lint."""
+    """One joint as written.
+
+    Attributes:
+        name: its name.
+        type: one of `TYPES`.
+        parent: name of the parent link.
+        child: name of the child link.
+        xyz: origin, (3,) [m].
+        rpy: origin, (3,) roll, pitch, yaw [rad].
+        axis: (3,) as written, of any length; None if there is none.
+        limits: (lower, upper) [rad or m]; None if there are none.
+        mimic: the joint it follows; None if it follows none.
+        line: line in the file.
+        texts: (attribute, text) of its numbers as they are written, for the lint.
+    """
 
     name: str
     type: str
@@ -49,8 +63,12 @@ class Link:
 
 @dataclass(frozen=True)
 class UrdfText:
-    """All that an engine is given: the XML, stripped to links and joints; and the link that a library which builds one chain
-    only is to end it at, if the mapping names one."""
+    """All that an engine is given.
+
+    Attributes:
+        text: the XML, stripped to links and joints.
+        tip: the link at which a library that builds one chain only is to end it; empty if the mapping names none.
+    """
 
     text: str
     tip: str = field(default="", kw_only=True)
@@ -58,7 +76,14 @@ class UrdfText:
 
 @dataclass(frozen=True)
 class Urdf(UrdfText):
-    """The kinematics of one URDF. May be malformed as a tree: see `urdf_lint.check`."""
+    """The kinematics of one URDF. It may be malformed as a tree: see `urdf_lint.check`.
+
+    Attributes:
+        path: the file.
+        name: name of the robot.
+        link_list: links in document order.
+        joint_list: joints in document order.
+    """
 
     path: Path
     name: str
@@ -101,8 +126,26 @@ class Urdf(UrdfText):
             below[joint.parent] = (*below.get(joint.parent, ()), joint)
         return below
 
+    def require_link(self, link: str, key: str) -> None:
+        """Refuse the name of a link that is not there.
+
+        Args:
+            link: the name.
+            key: the option that gave it, for the message.
+
+        Raises:
+            InputError: there is no such link.
+        """
+        if link not in self.links:
+            raise InputError(f"no link {link!r} in {self.path.name}; {nearest(link, self.links)}", key=key)
+
     def to_root(self, link: str) -> tuple[UrdfJoint, ...]:
-        """Joints from `link` up to its root. Raises KeyError for an unknown link, UrdfError if it runs in a circle."""
+        """Joints from a link up to its root.
+
+        Raises:
+            KeyError: there is no such link.
+            UrdfError: the way up runs in a circle.
+        """
         if link not in self.links:
             raise KeyError(f"no link {link!r}; {nearest(link, self.links)}")
         path: list[UrdfJoint] = []
@@ -114,7 +157,12 @@ class Urdf(UrdfText):
         return tuple(path)
 
     def between(self, base: str, tip: str) -> tuple[UrdfJoint, ...]:
-        """Joints that move `tip` relative to `base`, whichever is nearer the root; order from base to tip."""
+        """Joints between two links, in order from `base` to `tip`. Either may be nearer the root.
+
+        Raises:
+            KeyError: there is no such link.
+            UrdfError: the way to the root runs in a circle.
+        """
         up, down = self.to_root(base), self.to_root(tip)
         shared = {joint.name for joint in up} & {joint.name for joint in down}
         return tuple(j for j in up if j.name not in shared) + tuple(j for j in reversed(down) if j.name not in shared)

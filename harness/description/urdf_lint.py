@@ -31,11 +31,11 @@ class Finding:
 
 def lint(urdf: Urdf) -> tuple[Finding, ...]:
     """All findings, errors first, then by line."""
-    found = [*_names(urdf), *_structure(urdf)]
+    findings = [*_names(urdf), *_structure(urdf)]
     for joint in urdf.joint_list:
-        found += [*_axis(joint), *_mimic(urdf, joint), *_numbers(joint)]
+        findings += [*_axis(joint), *_mimic(urdf, joint), *_numbers(joint)]
     order = {"error": 0, "warning": 1, "note": 2}
-    return tuple(sorted(found, key=lambda f: (order[f.level], f.line)))
+    return tuple(sorted(findings, key=lambda f: (order[f.level], f.line)))
 
 
 def check(urdf: Urdf) -> tuple[Finding, ...]:
@@ -151,7 +151,7 @@ def _mimic(urdf: Urdf, joint: UrdfJoint) -> Iterator[Finding]:
             code="mimic-cycle", level="error", subject=joint.name, message=f"joint {joint.name!r} mimics itself", line=joint.line
         )
         return
-    message = f"joint {joint.name!r} mimics {joint.mimic.joint!r}: nine of eleven engines ignore that"
+    message = f"joint {joint.name!r} mimics {joint.mimic.joint!r}: many libraries ignore that; crosscheck engines lists them"
     yield Finding(code="mimic", level="warning", subject=joint.name, message=message, line=joint.line)
 
 

@@ -13,7 +13,7 @@ from harness.cause.explain import Explanation, explain
 from harness.cause.first_difference import first_difference
 from harness.cause.problem import Problem, Seen, State
 from harness.certificate.certify import Sampled, certify, sample
-from harness.certificate.interpolation import Axis
+from harness.certificate.interpolation import GRID_LIMIT, Axis
 from harness.description.dh import Convention
 from harness.difference.operands import TIP, Operand, matched
 from harness.kinematics.invariants import Matching, match
@@ -24,7 +24,6 @@ from harness.kinematics.side_by_side import Side, canonical_side
 from harness.se3 import Array
 
 FITTED, CHECKED = 16, 48
-GRID = 4096
 SLIDE = 0.5  # m, range of prismatic joints
 
 
@@ -121,7 +120,7 @@ def _bound(problem: Problem) -> tuple[float, float] | None:
     """Proven for every angle (prismatic joints within half a metre); None for long chains and where joints are coupled."""
     mechanism = _mechanism(problem.a)
     axes = [Axis(False, 1, -SLIDE, SLIDE) if slides else Axis(True, 1, 0.0, 2.0 * math.pi) for slides in mechanism.prismatic]
-    if math.prod(axis.count for axis in axes) > GRID:
+    if math.prod(axis.count for axis in axes) > GRID_LIMIT:
         return None
     sampled = []
     for recipe in (problem.a, problem.b):

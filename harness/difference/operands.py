@@ -16,7 +16,7 @@ from harness.description.model import load_model
 from harness.description.urdf import MOVABLE, UNSUPPORTED, Urdf
 from harness.description.urdf_file import read_urdf
 from harness.description.urdf_lint import check
-from harness.errors import InputError, UrdfError, nearest
+from harness.errors import InputError, UrdfError
 from harness.kinematics.recipes import Recipe, TableRecipe, UrdfRecipe
 from harness.workers.packaged_tables import packaged_table
 
@@ -95,8 +95,7 @@ def _of_urdf(path: Path, base: str | None, tip: str | None) -> Operand:
     check(urdf)
     base, tip = base or urdf.roots[0], tip or only_leaf(urdf)
     for option, link in (("--base", base), ("--tip", tip)):
-        if link not in urdf.links:
-            raise InputError(f"no link {link!r} in {urdf.path.name}; {nearest(link, urdf.links)}", key=option)
+        urdf.require_link(link, option)
     chain = urdf.between(base, tip)
     for joint in chain:
         if joint.type in UNSUPPORTED:

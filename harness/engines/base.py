@@ -30,7 +30,11 @@ Description: TypeAlias = "DHTable | UrdfText | Packaged"
 class Trait:
     """Something an engine does differently from the URDF specification or from other engines.
 
-    `key` names it; `lint` is the URDF finding that makes it matter (None: always); `evidence` is how it is known.
+    Attributes:
+        key: short name of it, the same for every engine that does it.
+        text: what the engine does, in one sentence.
+        evidence: how it is known: the version and the case that shows it.
+        lint: code of the URDF finding that makes it matter; None if it always matters.
     """
 
     key: str
@@ -42,15 +46,24 @@ class Trait:
 class Engine(ABC):
     """Forward kinematics of one description by one library.
 
-    Subclasses take the description in their constructor: what `takes` says, by default a `DHTable` if `source` starts with
-    `dh:`, a `UrdfText` if with `urdf:`. They set `joints` and `frames` in the library's own order and implement `_placements`.
-    A subclass's module runs in environments that have little more than NumPy and the library: it imports nothing else of
-    third parties, and the library itself only in the constructor, through `library()`.
+    A subclass takes the description in its constructor: a `DHTable` if `source` starts with `dh:`, a `UrdfText` if it starts
+    with `urdf:`, or what `takes` says. It sets `joints` and `frames` and implements `_placements`.
+    Its module runs in environments that have little more than NumPy and the library. So it imports nothing else of third
+    parties, and the library itself only in the constructor, through `library()`.
 
-    partial: it drops links by design, which its traits tell; what it has must still show every joint. isolated: whether it
-    runs in a process of its own. requirements: what pip installs. debian: packages of the system's own Python instead,
-    `imports` the modules they bring. resolution: what its arithmetic is good for [m, rad], if that is worse than float64: the
-    tolerance where model.toml does not give it one.
+    Attributes:
+        source: the engine's name, such as `urdf:pinocchio`.
+        takes: `packaged` if it takes a robot that its library ships; empty for a table or a URDF.
+        partial: the library omits some links, as its traits say. Every joint must still move at least one frame that it has.
+        isolated: whether it runs in a process of its own.
+        resolution: what its arithmetic is good for, [m] and [rad], if that is worse than float64. It is the tolerance of an
+            engine that model.toml does not list.
+        requirements: what pip installs for it.
+        debian: packages of the system's own Python that it needs instead.
+        imports: the modules that the `debian` packages bring.
+        traits: what it does differently, with evidence.
+        joints: names of its joints, in the library's order: the columns of q.
+        frames: names of its frames, in the library's order.
     """
 
     source: str
@@ -62,14 +75,18 @@ class Engine(ABC):
     debian: ClassVar[tuple[str, ...]] = ()
     imports: ClassVar[tuple[str, ...]] = ()
     traits: tuple[Trait, ...] = ()
-    applies_mimic: ClassVar[bool] = False
 
     joints: tuple[str, ...]
     frames: tuple[str, ...]
 
     @abstractmethod
     def __init__(self, description: Any) -> None:
-        """Build the library's model. Raises EngineUnavailable if it is not installed, EngineFailed if it refuses."""
+        """Build the library's model.
+
+        Raises:
+            EngineUnavailable: the library is not installed.
+            EngineFailed: the library refuses the description.
+        """
 
     @abstractmethod
     def _placements(self, q: Array, frames: Sequence[str]) -> Array:
@@ -78,9 +95,17 @@ class Engine(ABC):
     def placements(self, q: Array, frames: Sequence[str]) -> Array:
         """Placement of each named frame in the library's own root frame.
 
-        q: (N, n) float64, columns as `joints` [rad or m]. Returns (N, len(frames), 4, 4) [m].
-        Raises ValueError for a `q` of the wrong shape, KeyError for a frame the engine does not have, EngineFailed for a
-        result of the wrong shape.
+        Args:
+            q: joint values (N, n) float64, columns as `joints` [rad or m].
+            frames: names of the frames.
+
+        Returns:
+            Placements (N, len(frames), 4, 4) float64 [m].
+
+        Raises:
+            ValueError: `q` has the wrong shape.
+            KeyError: the engine does not have a frame.
+            EngineFailed: the library failed, or gave a result of the wrong shape.
         """
         q = np.asarray(q, dtype=np.float64)
         if q.ndim != 2 or q.shape[1] != len(self.joints):
@@ -97,14 +122,14 @@ class Engine(ABC):
     @classmethod
     def versions(cls) -> dict[str, str]:
         """Installed version of each required distribution in this environment; those that are missing are left out."""
-        found = {}
+        versions = {}
         for requirement in cls.requirements:
             name = re.split(r"[^A-Za-z0-9._-]", requirement, maxsplit=1)[0]
             try:
-                found[name] = metadata.version(name)
+                versions[name] = metadata.version(name)
             except metadata.PackageNotFoundError:
                 continue
-        return found
+        return versions
 
     def installed(self) -> dict[str, str]:
         """Versions of the libraries this engine runs on."""
@@ -112,7 +137,11 @@ class Engine(ABC):
 
     @classmethod
     def library(cls, module: str) -> ModuleType:
-        """Import the library. Raises EngineUnavailable if that fails."""
+        """Import a module of the library.
+
+        Raises:
+            EngineUnavailable: it cannot be imported.
+        """
         try:
             return importlib.import_module(module)
         except ImportError as error:

@@ -18,7 +18,7 @@ from harness.description.dh import DHRow, DHTable
 from harness.engines.base import Engine, Trait
 from harness.se3 import Array, sincos
 
-BLOCK = 4096
+BLOCK = 4096  # configurations at a time, so that one frame of all of them stays in the cache
 THREADED = 4  # blocks from which threads pay
 
 

@@ -9,7 +9,6 @@ from importlib import metadata
 from harness.description.model import RobotModel
 from harness.description.packaged import Packaged
 from harness.description.urdf import UrdfText
-from harness.engines import requirements
 from harness.engines.base import Description, Engine
 from harness.errors import DescriptionUnavailable, EngineUnavailable, InputError, nearest
 
@@ -19,7 +18,13 @@ REFERENCE = "dh:numpy"
 
 @dataclass(frozen=True)
 class Registered:
-    """One entry point: its adapter class, or why it could not be imported."""
+    """One entry point.
+
+    Attributes:
+        name: source name.
+        adapter: the adapter class; None if it could not be imported.
+        problem: why it could not be imported; empty if it could.
+    """
 
     name: str
     adapter: type[Engine] | None
@@ -32,7 +37,7 @@ def registered() -> dict[str, Registered]:
 
     The entry point's name is the source name with `-` for `:`. A broken third-party adapter is listed with its problem.
     """
-    found: dict[str, Registered] = {}
+    engines: dict[str, Registered] = {}
     for point in metadata.entry_points(group=GROUP):
         source = point.name.replace("-", ":", 1)
         try:
@@ -42,14 +47,19 @@ def registered() -> dict[str, Registered]:
             entry = Registered(adapter.source, adapter)
         except Exception as error:  # third-party code: whatever it raises must not end the run
             entry = Registered(source, None, f"entry point {point.value}: {type(error).__name__}: {error}")
-        if entry.name in found and found[entry.name].adapter is not entry.adapter:
+        if entry.name in engines and engines[entry.name].adapter is not entry.adapter:
             entry = Registered(entry.name, None, f"two packages offer {entry.name}: second is {point.value}")
-        found[entry.name] = entry
-    return dict(sorted(found.items(), key=lambda item: (item[0] != REFERENCE, item[0])))
+        engines[entry.name] = entry
+    return dict(sorted(engines.items(), key=lambda item: (item[0] != REFERENCE, item[0])))
 
 
 def adapter_of(source: str) -> type[Engine]:
-    """Adapter class of a source name. Raises InputError if unknown, EngineUnavailable if its adapter is broken."""
+    """Adapter class of a source name.
+
+    Raises:
+        InputError: there is no such source.
+        EngineUnavailable: its adapter cannot be imported.
+    """
     known = registered()
     if source not in known:
         raise InputError(f"no source {source!r}; {nearest(source, known)}")
@@ -60,12 +70,22 @@ def adapter_of(source: str) -> type[Engine]:
 
 
 def kind_of(source: str) -> str:
-    """Kind of description a source computes from: `urdf`, or `dh`, which a command without a prefix is taken for."""
+    """Kind of description a source computes from: `urdf` if its name starts so, else `dh`."""
     return "urdf" if source.startswith("urdf:") else "dh"
 
 
 def description_of(source: str, model: RobotModel, takes: str = "") -> Description:
-    """What an engine of this name is given. Raises DescriptionUnavailable or EngineUnavailable if the model has none."""
+    """What a source is given: the model's table, its URDF, or the name of a robot that the library ships.
+
+    Args:
+        source: source name.
+        model: the robot model.
+        takes: what the adapter takes, see `Engine.takes`.
+
+    Raises:
+        DescriptionUnavailable: it reads a URDF, and the model has none.
+        EngineUnavailable: it takes a packaged robot, and frames.toml names none for it.
+    """
     if takes == "packaged":
         names = model.engine_names.get(source)
         if names is None or names.robot is None:
@@ -81,12 +101,3 @@ def description_of(source: str, model: RobotModel, takes: str = "") -> Descripti
         return model.urdf
     link = next(frame.urdf for frame in model.frames.frames if frame.name == names.tip)
     return UrdfText(model.urdf.text, tip=link or "")
-
-
-def load_engine(source: str, model: RobotModel) -> Engine:
-    """Build the engine `source` on the model's description, in this process.
-
-    Raises InputError (unknown source), EngineUnavailable (not installed), EngineFailed (refuses the description).
-    """
-    adapter = adapter_of(source)
-    return requirements.build(adapter, description_of(source, model, adapter.takes))

@@ -17,11 +17,11 @@ def install_line(adapter: type[Engine]) -> str:
     return f"crosscheck engines install {shlex.quote(adapter.source)}"
 
 
-def unmet(adapter: type[Engine], found: Mapping[str, str]) -> str:
-    """The first requirement that `found` (distribution: version) does not meet, as a clause; empty if it meets all."""
+def unmet(adapter: type[Engine], installed: Mapping[str, str]) -> str:
+    """The first requirement that `installed` (distribution: version) does not meet, as a clause; empty if it meets all."""
     for text in adapter.requirements:
         need = Requirement(text)
-        have = found.get(need.name)
+        have = installed.get(need.name)
         if have is None:
             return f"{need.name} is not installed"
         if not need.specifier.contains(have, prereleases=True):

@@ -19,7 +19,6 @@ class UrdfUrchin(Engine):
 
     source = "urdf:urchin"
     requirements = ("urchin>=0.0.30",)
-    applies_mimic = True
     traits = (
         Trait(
             "mimic-applied",

@@ -18,7 +18,6 @@ class UrdfYourdfpy(Engine):
 
     source = "urdf:yourdfpy"
     requirements = ("yourdfpy>=0.0.56",)
-    applies_mimic = True
     traits = (
         Trait(
             "prismatic-scaled",

@@ -29,8 +29,8 @@ class Degrees(DHNumpy):
     source = "controller"
 
     def _placements(self, q: Array, frames: Sequence[str]) -> Array:
-        turning = [self.table.kind(name) == "revolute" for name in self.joints]
-        return super()._placements(np.where(turning, np.degrees(q), q), frames)
+        turns = [self.table.kind(name) == "revolute" for name in self.joints]
+        return super()._placements(np.where(turns, np.degrees(q), q), frames)
 
 
 class Inverse(DHNumpy):
@@ -53,8 +53,8 @@ class Reversed(DHNumpy):
         placed, joint = {"base": np.tile(np.eye(4), (len(q), 1, 1)), "0": T}, 0
         for i, row in enumerate(table.rows, start=1):
             moves = row.kind != "fixed"
-            alone = DHNumpy(DHTable((row,), table.convention))
-            A = alone.placements(q[:, joint : joint + 1] if moves else np.empty((len(q), 0)), ("1",))[:, 0]
+            one_row = DHNumpy(DHTable((row,), table.convention))
+            A = one_row.placements(q[:, joint : joint + 1] if moves else np.empty((len(q), 0)), ("1",))[:, 0]
             joint += moves
             placed[str(i)] = T = A @ T
         placed["tool"] = table.tool @ T

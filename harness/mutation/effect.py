@@ -35,14 +35,14 @@ def effect_of(mutant: Mutant, original: RobotModel, source: str) -> Effect:
     law = original.configurations
     q = np.concatenate([law.fixed_q, np.random.default_rng(1).uniform(law.lower, law.upper, (SAMPLES, len(law.lower)))])
     names = tuple(f.name for f in original.frames.frames if kind_of(source) == "dh" or f.urdf is not None)
-    was = _pair(original, source, q, names, None)
-    now = _pair(mutant.model, source, q, names, mutant.fault or None)
-    D_was, D_now = was[0] - was[1], now[0] - now[1]
-    change = D_now - D_was
+    T_a, T_b = _pair(mutant.model, source, q, names, mutant.fault or None)
+    T_a_original, T_b_original = _pair(original, source, q, names, None)
+    D = T_a - T_b
+    change = D - (T_a_original - T_b_original)
     return Effect(
         frames=names,
-        position=np.linalg.norm(D_now[..., :3, 3], axis=-1).max(axis=0),
-        rotation=np.linalg.norm(D_now[..., :3, :3], axis=(-2, -1)).max(axis=0) / np.sqrt(2.0),
+        position=np.linalg.norm(D[..., :3, 3], axis=-1).max(axis=0),
+        rotation=np.linalg.norm(D[..., :3, :3], axis=(-2, -1)).max(axis=0) / np.sqrt(2.0),
         position_change=np.linalg.norm(change[..., :3, 3], axis=-1).max(axis=0),
         rotation_change=np.linalg.norm(change[..., :3, :3], axis=(-2, -1)).max(axis=0) / np.sqrt(2.0),
     )

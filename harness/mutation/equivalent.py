@@ -71,10 +71,11 @@ def _as_modified(model: RobotModel) -> Mutant:
     table = model.table
     alphas, lengths = [0.0, *(r.alpha for r in table.rows)], [0.0, *(r.a for r in table.rows)]
     rows = [replace(r, alpha=alphas[i], a=lengths[i]) for i, r in enumerate(table.rows)]
-    behind = {str(i): se3.translation((r.a, 0.0, 0.0)) @ se3.rotation("x", r.alpha) for i, r in enumerate(table.rows, start=1)}
+    # By DH frame: what its row has after the joint, which modified DH writes on the next row.
+    ends = {str(i): se3.translation((r.a, 0.0, 0.0)) @ se3.rotation("x", r.alpha) for i, r in enumerate(table.rows, start=1)}
     last = str(len(table.rows))
-    tool = behind[last] @ table.tool
-    frames = [offset_by(f, behind[f.dh]) if f.dh in behind else f for f in model.frames.frames]
+    tool = ends[last] @ table.tool
+    frames = [offset_by(f, ends[f.dh]) if f.dh in ends else f for f in model.frames.frames]
     modified = with_rows(model, rows, convention="modified", tool=tool)
     return Mutant(
         name="standard rewritten as modified", side="table", operator="as modified", model=with_frames(modified, frames)

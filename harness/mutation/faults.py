@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 from lxml import etree
 
 from harness import se3
-from harness.cause.catalogue import CUT
 from harness.description.dh import DHRow
 from harness.description.model import RobotModel
 from harness.mutation.mutant import Cause, Fault, Mutant, with_frames, with_row, with_rows
 from harness.mutation.numbers import with_urdf
 from harness.se3 import Array
 
+# (a number, whether it is an angle) to the number that is written instead.
+EditNumber: TypeAlias = Callable[[float, bool], float]
+
 OFFSETS = ((math.pi / 2, "pi/2"), (math.radians(1.0), "1 deg"))
+SHORT_PI = 3.1416
+SAME_ANGLE = 1e-8  # rad: a URDF's own digits of pi are few
 
 
 def of_joints(model: RobotModel) -> Iterator[Mutant]:
@@ -127,34 +132,35 @@ def of_whole(model: RobotModel) -> Iterator[Mutant]:
     )
     yield _rows(model, "table in degrees", "degrees", lambda x, angle: math.degrees(x) if angle else x, Cause("degrees"))
     yield _rows(model, "table as float32", "float32", lambda x, angle: float(np.float32(x)), Cause("float32"))
-    yield _rows(model, "table with pi = 3.1416", "3.1416", lambda x, angle: _cut(x) if angle else x, Cause("truncated pi"))
+    yield _rows(model, "table with pi = 3.1416", "3.1416", _with_short_pi, Cause("truncated pi"))
     if model.urdf is not None:
         yield _origins(
             model, "URDF in millimetres", "millimetres", lambda x, angle: x if angle else x * 1e3, Cause("millimetres")
         )
         yield _origins(model, "URDF in degrees", "degrees", lambda x, angle: math.degrees(x) if angle else x, Cause("degrees"))
         yield _origins(model, "URDF as float32", "float32", lambda x, angle: float(np.float32(x)), Cause("float32"))
-        yield _origins(model, "URDF with pi = 3.1416", "3.1416", lambda x, angle: _cut(x) if angle else x, Cause("truncated pi"))
+        yield _origins(model, "URDF with pi = 3.1416", "3.1416", _with_short_pi, Cause("truncated pi"))
 
 
-def _cut(x: float) -> float:
-    twelfths = round(x / (math.pi / 12))
-    return twelfths * CUT[1] / 12 if twelfths and abs(x - twelfths * math.pi / 12) < 1e-8 else x
+def _with_short_pi(x: float, angle: bool) -> float:
+    """A multiple of pi / 12 with 3.1416 for pi; any other number as it is."""
+    twelfths = round(x / (math.pi / 12)) if angle else 0
+    return twelfths * SHORT_PI / 12 if twelfths and abs(x - twelfths * math.pi / 12) < SAME_ANGLE else x
 
 
-def _rows(model: RobotModel, name: str, operator: str, edit: object, cause: Cause) -> Mutant:
-    f = edit if callable(edit) else None
-    if f is None:
-        raise ValueError("expected a function")
+def _rows(model: RobotModel, name: str, operator: str, edit: EditNumber, cause: Cause) -> Mutant:
+    """Every number of the table's rows edited."""
     rows = [
-        replace(r, a=f(r.a, False), d=f(r.d, False), alpha=f(r.alpha, True), theta=f(r.theta, True)) for r in model.table.rows
+        replace(r, a=edit(r.a, False), d=edit(r.d, False), alpha=edit(r.alpha, True), theta=edit(r.theta, True))
+        for r in model.table.rows
     ]
     return Mutant(name=name, side="table", operator=operator, model=with_rows(model, rows), causes=(cause,))
 
 
-def _origins(model: RobotModel, name: str, operator: str, edit: object, cause: Cause) -> Mutant:
-    if model.urdf is None or not callable(edit):
-        raise ValueError("expected a model with a URDF, and a function")
+def _origins(model: RobotModel, name: str, operator: str, edit: EditNumber, cause: Cause) -> Mutant:
+    """Every number of the URDF's origins edited."""
+    if model.urdf is None:
+        raise ValueError("expected a model with a URDF")
     robot = etree.fromstring(model.urdf.text.encode())
     for origin in robot.iter("origin"):
         for attribute, angle in (("xyz", False), ("rpy", True)):
@@ -173,7 +179,7 @@ def of_tool(model: RobotModel) -> Iterator[Mutant]:
             side="table",
             operator="tool missing",
             model=missing,
-            causes=(Cause("tool left out"), *_alone(table.tool)),
+            causes=(Cause("tool left out"), *_as_one_number(table.tool)),
         )
     elif last.kind == "fixed" and last.d:
         mutated = with_row(model, len(table.rows) - 1, d=0.0)
@@ -197,7 +203,7 @@ def of_tool(model: RobotModel) -> Iterator[Mutant]:
         )
 
 
-def _alone(tool: Array) -> list[Cause]:
+def _as_one_number(tool: Array) -> list[Cause]:
     """The one number of a tool that is a move along, or a turn about, one axis: naming it names the tool."""
     roll, pitch, yaw = se3.to_rpy(tool)
     moves = [("move x", tool[0, 3]), ("move y", tool[1, 3]), ("move z", tool[2, 3])]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from lxml import etree
@@ -11,7 +11,6 @@ from harness.description.joints import mapped_chain
 from harness.description.model import RobotModel
 from harness.description.urdf_file import parse_urdf
 from harness.description.urdf_lint import check
-from harness.kinematics.mechanism import Parameter
 from harness.mutation.mutant import Cause, Mutant, with_row
 
 STEPS = (
@@ -19,6 +18,8 @@ STEPS = (
     ("10 um, 10 urad", 1e-5, {"m": "10 um", "rad": "10 urad"}),
     ("1 nm, 1 nrad", 1e-9, {"m": "1 nm", "rad": "1 nrad"}),
 )
+# What an explanation calls the numbers of an `<origin>`.
+ORIGIN_NUMBERS = {"xyz": ("origin x", "origin y", "origin z"), "rpy": ("roll", "pitch", "yaw")}
 
 
 def changes_of(value: float, unit: str) -> Iterator[tuple[str, str, float]]:
@@ -47,23 +48,17 @@ def of_urdf(model: RobotModel) -> Iterator[Mutant]:
     if model.urdf is None:
         return
     for joint in mapped_chain(model.urdf, model.frames).values():
-        numbers = (
-            *(("xyz", k, v, "m") for k, v in enumerate(joint.xyz)),
-            *(("rpy", k, v, "rad") for k, v in enumerate(joint.rpy)),
-        )
-        for attribute, k, value, unit in numbers:
-            parameter = Parameter(joint.name, f"origin {'xyz'[k]}" if unit == "m" else ("roll", "pitch", "yaw")[k], "m")
-            for operator, text, change in changes_of(value, unit):
-                values = [v + change if i == k else v for i, v in enumerate(getattr(joint, attribute))]
-                mutated = with_origin(model, joint.name, attribute, values)
-                cause = Cause("parameter", joint.name, parameter.name, -change)
-                yield Mutant(
-                    name=f"{parameter.name} of {joint.name} {text}",
-                    side="urdf",
-                    operator=operator,
-                    model=mutated,
-                    causes=(cause,),
-                )
+        for attribute, written, unit in (("xyz", joint.xyz, "m"), ("rpy", joint.rpy, "rad")):
+            for k, (name, value) in enumerate(zip(ORIGIN_NUMBERS[attribute], written, strict=True)):
+                for operator, text, change in changes_of(value, unit):
+                    values = [v + change if i == k else v for i, v in enumerate(written)]
+                    yield Mutant(
+                        name=f"{name} of {joint.name} {text}",
+                        side="urdf",
+                        operator=operator,
+                        model=with_origin(model, joint.name, attribute, values),
+                        causes=(Cause("parameter", joint.name, name, -change),),
+                    )
 
 
 def with_origin(model: RobotModel, joint: str, attribute: str, values: list[float]) -> RobotModel:
@@ -78,10 +73,10 @@ def with_origin(model: RobotModel, joint: str, attribute: str, values: list[floa
     return with_joint(model, joint, edit)
 
 
-def with_joint(model: RobotModel, joint: str, edit: object) -> RobotModel:
-    """The model with one `<joint>` of its URDF edited as XML, and the file read again."""
-    if model.urdf is None or not callable(edit):
-        raise ValueError("expected a model with a URDF, and a function")
+def with_joint(model: RobotModel, joint: str, edit: Callable[[etree._Element], None]) -> RobotModel:
+    """The model with one `<joint>` of its URDF edited as XML, in place, and the file read again."""
+    if model.urdf is None:
+        raise ValueError("expected a model with a URDF")
     robot = etree.fromstring(model.urdf.text.encode())
     edit(next(e for e in robot.iter("joint") if e.get("name") == joint))
     return with_urdf(model, robot)

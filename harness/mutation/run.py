@@ -20,11 +20,10 @@ from harness.mutation.trial import SAMPLES, mutants_of, try_out
 from harness.report.explanation import Change
 from harness.run.options import Options
 from harness.verdict.crosscheck import crosscheck
-from harness.workers.environments import where
+from harness.workers.environments import THREAD_VARIABLES, where
 
 SOURCES = ("urdf:pinocchio", "urdf:pytorch-kinematics")
 CHUNK = 12
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 Progress = Callable[[int, int], None]
 
@@ -49,8 +48,8 @@ def _known(folder: Path, source: str) -> list[Change]:
     report = crosscheck(
         model, Options(samples=SAMPLES, seed=0, sources=(source,), certify=False, in_process=True), None, _workers()
     )
-    found = report.sources[-1].explanation
-    return found.changes if found else []
+    explanation = report.sources[-1].explanation
+    return explanation.changes if explanation else []
 
 
 def _chunk(folder: Path, indices: Sequence[int], sources: Sequence[str]) -> list[Trial]:
@@ -86,7 +85,7 @@ def run_mutants(
         tasks += [(folder, list(chosen[k : k + CHUNK]), here) for k in range(0, len(chosen), CHUNK)]
     done: dict[int, list[Trial]] = {}
     total, finished = sum(len(t[1]) for t in tasks), 0
-    for name in THREADS:  # the cores are shared among processes, not fought over by their libraries
+    for name in THREAD_VARIABLES:
         os.environ.setdefault(name, "1")
     with ProcessPoolExecutor(jobs or os.cpu_count() or 1, multiprocessing.get_context("spawn")) as pool:
         futures = {pool.submit(_chunk, *task): k for k, task in enumerate(tasks)}

@@ -1,4 +1,4 @@
-"""The score of a mutation run: typed, written as JSON, told as a table."""
+"""The score of a mutation run: typed, written as JSON, printed as tables."""
 
 from __future__ import annotations
 
@@ -14,15 +14,23 @@ from harness.mutation.mutant import Mutant
 from harness.report.parts import Part
 from harness.report.text import plain
 
-Outcome = Literal["caught", "missed", "below the floor", "left alone", "false alarm", "refused", ""]
+Outcome = Literal["caught", "missed", "below the floor", "left alone", "false alarm", "refused"]
+
+COLUMNS = ("caught", "missed", "below the floor", "equivalent, not flagged", "false alarms", "refused", "cause named")
 
 
 class Trial(Part):
     """One mutant seen by one source.
 
-    outcome: caught or missed; `below the floor`: cannot be seen at this source's tolerance, which is no pass; `left alone` or
-    `false alarm`: the same mechanism, as this source reads it; `refused`: the source did not take it. effect: how far it moves
-    any frame [m or rad]. told: the explanation; cause_named: whether the first group names the cause, with joint and size.
+    outcome:
+        `caught` or `missed`: flagged, or not, and it can be seen.
+        `below the floor`: it cannot be seen at this source's tolerance, which is no pass.
+        `left alone` or `false alarm`: not flagged, or flagged, and the same mechanism as this source reads it.
+        `refused`: the source did not take it.
+    effect: how far it moves any frame [m or rad].
+    cause_named: whether the first group of changes names the cause, with joint and size; None if none was looked for.
+    told: the explanation as text.
+    note: why it was missed, not seen or refused.
     """
 
     robot: str
@@ -37,11 +45,23 @@ class Trial(Part):
     note: str = ""
 
     @classmethod
-    def of(cls, mutant: Mutant, robot: str, source: str, outcome: Outcome, note: str) -> Trial:
+    def of(
+        cls, mutant: Mutant, source: str, outcome: Outcome, *,
+        effect: float = 0.0, cause_named: bool | None = None, told: str = "", note: str = "",
+    ) -> Trial:  # fmt: skip
         """A trial of this mutant."""
         return cls(
-            robot=robot, source=source, mutant=mutant.name, side=mutant.side, operator=mutant.operator, outcome=outcome, note=note
-        )  # fmt: skip
+            robot=mutant.model.name,
+            source=source,
+            mutant=mutant.name,
+            side=mutant.side,
+            operator=mutant.operator,
+            outcome=outcome,
+            effect=effect,
+            cause_named=cause_named,
+            told=told,
+            note=note,
+        )
 
 
 class Tally(Part):
@@ -113,10 +133,10 @@ def score(trials: Sequence[Trial], every: int, seconds: float, left_out: list[st
 
 
 def show(result: MutationScore, console: Console, most: int = 40) -> None:
-    """The tables, then every trial that is not as it should be."""
+    """Print the tables, then the first `most` trials that are not as they should be."""
     for title, tallies in (("robot", result.by_robot), ("source", result.by_source), ("operator", result.by_operator)):
         table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
-        for column in (title, "caught", "missed", "below the floor", "left alone", "false alarms", "refused", "cause named"):
+        for column in (title, *COLUMNS):
             table.add_column(column, justify="left" if column == title else "right", overflow="fold")
         for name, t in (*tallies.items(), ("all", result.total)):
             share = f"{t.named} of {t.caught}" + (f", {100.0 * t.named / t.caught:.1f} %" if t.caught else "")
@@ -124,12 +144,12 @@ def show(result: MutationScore, console: Console, most: int = 40) -> None:
             table.add_row(Text(plain(name)), *(str(c) for c in cells), share)
         console.print(table)
         console.print()
-    odd = [t for t in result.trials if t.outcome in ("missed", "false alarm", "refused") or t.cause_named is False]
-    for trial in odd[:most]:
+    wrong = [t for t in result.trials if t.outcome in ("missed", "false alarm", "refused") or t.cause_named is False]
+    for trial in wrong[:most]:
         what = "cause not named" if trial.outcome == "caught" else trial.outcome
         text = f"{what}: {trial.robot}, {trial.source}: {trial.mutant}: {trial.told or trial.note}"
         console.print(Text(plain(text)), soft_wrap=True)
-    if len(odd) > most:
-        console.print(Text(f"and {len(odd) - most} more in the JSON"))
+    if len(wrong) > most:
+        console.print(Text(f"and {len(wrong) - most} more in the JSON"))
     for text in result.sources_left_out:
         console.print(Text(plain(f"left out: {text}"), style="yellow"), soft_wrap=True)

@@ -24,31 +24,20 @@ def of_axes(model: RobotModel) -> Iterator[Mutant]:
     for joint in moving:
         axis = joint.axis or (0.0, 0.0, 1.0)
         letter = "xyz"[int(np.abs(axis).argmax())]
-
-        def write(element: etree._Element, values: tuple[float, ...] | None) -> None:
-            old = element.find("axis")
-            if old is not None:
-                element.remove(old)
-            if values is not None:
-                etree.SubElement(element, "axis", xyz=" ".join(repr(v) for v in values))
-
-        left_out = with_joint(model, joint.name, lambda e: write(e, None))
         yield Mutant(
             name=f"axis of {joint.name} left out",
             side="urdf",
             operator="axis left out",
-            model=left_out,
+            model=_with_axis(model, joint.name, None),
             causes=(Cause("axis", joint.name, letter),),
         )
-        negated = with_joint(model, joint.name, lambda e, a=axis: write(e, tuple(-x for x in a)))
         yield Mutant(
             name=f"axis of {joint.name} negated",
             side="urdf",
             operator="joint sign",
-            model=negated,
+            model=_with_axis(model, joint.name, tuple(-x for x in axis)),
             causes=(Cause("sign", _model_joint(model, joint)),),
         )
-        doubled = with_joint(model, joint.name, lambda e, a=axis: write(e, tuple(2.0 * x for x in a)))
         scaled = joint.type == "prismatic"
         extra = ("urdf:yourdfpy",) if scaled else ()
         causes = (Cause("axis length"),) if scaled else ()
@@ -56,10 +45,23 @@ def of_axes(model: RobotModel) -> Iterator[Mutant]:
             name=f"axis of {joint.name} of length 2",
             side="urdf",
             operator="axis unnormalised",
-            model=doubled,
+            model=_with_axis(model, joint.name, tuple(2.0 * x for x in axis)),
             causes=causes,
             extra=extra,
         )
+
+
+def _with_axis(model: RobotModel, joint: str, axis: tuple[float, ...] | None) -> RobotModel:
+    """The model with another axis written for a joint of its URDF; None leaves it out."""
+
+    def edit(element: etree._Element) -> None:
+        written = element.find("axis")
+        if written is not None:
+            element.remove(written)
+        if axis is not None:
+            etree.SubElement(element, "axis", xyz=" ".join(repr(x) for x in axis))
+
+    return with_joint(model, joint, edit)
 
 
 def _model_joint(model: RobotModel, joint: UrdfJoint) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 from harness.description.model import RobotModel
 from harness.errors import CrosscheckError
@@ -34,41 +35,48 @@ def mutants_of(model: RobotModel) -> Iterator[Mutant]:
 def try_out(
     mutant: Mutant, original: RobotModel, sources: Sequence[str], workers: FaultyWorkers, known: Sequence[reasons.Change]
 ) -> list[Trial]:
-    """Cross-check the mutant; one trial for each source. known: what explains the original."""
+    """Cross-check one mutant.
+
+    Args:
+        mutant: the mutant; a controller with a fault is run alone, without the other sources.
+        original: the model it was made from.
+        sources: names of the sources that are asked.
+        workers: start the controller that has the mutant's fault.
+        known: the changes that explain the original's own accepted deviations.
+
+    Returns:
+        One trial for each source.
+    """
     named = (NAMES[mutant.fault],) if mutant.fault else (*sources, *(s for s in mutant.extra if s not in sources))
     workers.model = mutant.model
     commands = ((named[0], (str(mutant.fault),)),) if mutant.fault else ()
-    chosen = () if mutant.fault else named
     options = Options(
-        samples=SAMPLES, seed=0, sources=chosen, workers=commands, certify=bool(original.file.accepted), in_process=True
+        samples=SAMPLES, seed=0, sources=named, workers=commands, certify=bool(original.file.accepted), in_process=True
     )
-    model = mutant.model
-    if mutant.fault:  # the program alone
-        model = replace(model, file=model.file.model_copy(update={"source": []}))
     try:
-        report = crosscheck(model, options, None, workers)
+        report = crosscheck(mutant.model, options, None, workers)
     except CrosscheckError as error:
-        return [Trial.of(mutant, original.name, source, "refused", str(error)) for source in named]
+        return [Trial.of(mutant, source, "refused", note=str(error)) for source in named]
     by_name = {s.name: s for s in report.sources}
     return [_judged(mutant, original, by_name[source], effect_of(mutant, original, source), known) for source in named]
 
 
 def _judged(mutant: Mutant, original: RobotModel, source: doc.Source, effect: Effect, known: Sequence[reasons.Change]) -> Trial:
-    trial = Trial.of(mutant, original.name, source.name, "", "")
+    """The trial of a mutant at one source: whether it was flagged, and whether it should have been."""
     largest = float(max(effect.position_change.max(initial=0.0), effect.rotation_change.max(initial=0.0)))
-    trial = trial.model_copy(update={"effect": largest})
+    trial = partial(Trial.of, mutant, source.name, effect=largest)
     if source.status != "ran":
-        return trial.model_copy(update={"outcome": "refused", "note": source.reason})
+        return trial("refused", note=source.reason)
     flagged = source.verdict.disagrees
-    if largest <= NOTHING or mutant.equivalent:
-        if mutant.equivalent and largest > NOTHING:
-            return trial.model_copy(update={"outcome": "missed", "note": f"not equivalent after all: {largest:.2g}"})
-        return trial.model_copy(update={"outcome": "false alarm" if flagged else "left alone"})
+    if mutant.equivalent and largest > NOTHING:
+        return trial("missed", note=f"not equivalent after all: {largest:.2g}")
+    if mutant.equivalent or largest <= NOTHING:
+        return trial("false alarm" if flagged else "left alone")
     if not flagged:
         floor = _floor(effect, original, source)
-        return trial.model_copy(update={"outcome": "missed" if floor is None else "below the floor", "note": floor or ""})
-    told, named = _cause(mutant, source, known)
-    return trial.model_copy(update={"outcome": "caught", "cause_named": named, "told": told})
+        return trial("missed" if floor is None else "below the floor", note=floor or "")
+    text, named = _cause(mutant, source, known)
+    return trial("caught", cause_named=named, told=text)
 
 
 def _floor(effect: Effect, original: RobotModel, source: doc.Source) -> str | None:
@@ -89,13 +97,22 @@ def _floor(effect: Effect, original: RobotModel, source: doc.Source) -> str | No
 
 
 def _cause(mutant: Mutant, source: doc.Source, known: Sequence[reasons.Change]) -> tuple[str, bool]:
-    """What was told, and whether the first group names the cause, with joint and size, and nothing beside what was known."""
-    found = source.explanation
-    if found is None or not found.changes:
-        return (found.unexplained if found else "nothing"), False
-    told = " and ".join(change.text for change in found.changes)
+    """The explanation as text, and whether it names the cause.
+
+    It names the cause if one of its changes is the mutant's, with joint and size, and if it has at most one change more than
+    the original's own.
+    """
+    explanation = source.explanation
+    if explanation is None or not explanation.changes:
+        return (explanation.unexplained if explanation else "nothing"), False
     # A number that was off before is off by both.
-    before = {(one.subject, one.parameter): one.size for change in known for one in (change, *change.equivalents)}
-    causes = [c if c.size is None else replace(c, size=c.size + before.get((c.subject, c.parameter), 0.0)) for c in mutant.causes]
-    hit = any(cause.named_by(said) for cause in causes for change in found.changes for said in (change, *change.equivalents))
-    return told, hit and len(found.changes) <= 1 + len(known)
+    known_sizes = {(one.subject, one.parameter): one.size for change in known for one in (change, *change.equivalents)}
+    causes = [
+        cause if cause.size is None else replace(cause, size=cause.size + known_sizes.get((cause.subject, cause.parameter), 0.0))
+        for cause in mutant.causes
+    ]
+    named = any(
+        cause.named_by(one) for cause in causes for change in explanation.changes for one in (change, *change.equivalents)
+    )
+    text = " and ".join(change.text for change in explanation.changes)
+    return text, named and len(explanation.changes) <= 1 + len(known)

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from harness.report.document import Report, Source
-from harness.report.pose import FramePair, Pose
+from harness.report.pose import FramePair
 from harness.report.source_parts import Statistics
 from harness.report.text import metres, plain, radians
 from harness.report.verdicts import Verdict
@@ -41,29 +42,29 @@ def skeletons(report: Report) -> dict[str, Figure]:
 
     Those that disagree come first; what would make the page larger than BUDGET is left out.
     """
-    found: dict[str, Figure] = {}
+    figures: dict[str, Figure] = {}
     order = {label.label: i for i, label in enumerate(report.trees.dh)}
     rank = {frame.name: order.get(frame.dh, len(order)) for frame in report.frames}
     spent = 0
     for i, source in sorted(enumerate(report.sources), key=lambda pair: pair[1].verdict is Verdict.AGREES):
         if source.pose is None:
             continue
-        pose = source.pose.model_copy(update={"frames": sorted(source.pose.frames, key=lambda f: rank[f.frame])})
-        factor = _factor(pose) if source.verdict is not Verdict.AGREES else 1.0
+        pairs = sorted(source.pose.frames, key=lambda f: rank[f.frame])
+        factor = _factor(pairs) if source.verdict is not Verdict.AGREES else 1.0
         figure = {
-            "true": _traces(pose, report.settings.reference, source.name, 1.0),
-            "magnified": _traces(pose, report.settings.reference, source.name, factor) if factor > 1.0 else None,
+            "true": _traces(pairs, report.settings.reference, source.name, 1.0),
+            "magnified": _traces(pairs, report.settings.reference, source.name, factor) if factor > 1.0 else None,
             "factor": factor,
         }
         spent += len(json.dumps(figure))
         if spent > BUDGET:
             break
-        found[f"source-{i}"] = figure
-    return found
+        figures[f"source-{i}"] = figure
+    return figures
 
 
-def _placements(pose: Pose) -> tuple[Array, Array]:
-    return np.array([f.reference for f in pose.frames]), np.array([f.source for f in pose.frames])
+def _placements(pairs: Sequence[FramePair]) -> tuple[Array, Array]:
+    return np.array([f.reference for f in pairs]), np.array([f.source for f in pairs])
 
 
 def _extent(T: Array) -> float:
@@ -71,9 +72,9 @@ def _extent(T: Array) -> float:
     return max(float(np.linalg.norm(np.ptp(points, axis=0))), 1e-3)
 
 
-def _factor(pose: Pose) -> float:
+def _factor(pairs: Sequence[FramePair]) -> float:
     """The power of ten that makes the largest difference visible; 1 if it is, or if there is none."""
-    T_a, T_b = _placements(pose)
+    T_a, T_b = _placements(pairs)
     position, rotation = position_error(T_a, T_b).max(), rotation_error(T_a, T_b).max()
     largest = float(max(position / (SEEN * _extent(T_a)), rotation / TURNED))
     return 10.0 ** max(0, math.floor(-math.log10(largest))) if 0.0 < largest < 1.0 else 1.0
@@ -106,11 +107,11 @@ def _magnified(T_a: Array, T_b: Array, factor: float) -> Array:
     return T
 
 
-def _traces(pose: Pose, reference: str, source: str, factor: float) -> list[Figure]:
-    T_a, T_b = _placements(pose)
+def _traces(pairs: Sequence[FramePair], reference: str, source: str, factor: float) -> list[Figure]:
+    T_a, T_b = _placements(pairs)
     size = TRIAD_SIZE * _extent(T_a)
-    names = [letters(f.frame) for f in pose.frames]
-    off = [apart(f) for f in pose.frames]
+    names = [letters(f.frame) for f in pairs]
+    off = [apart(f) for f in pairs]
     T_b = T_b if factor == 1.0 else _magnified(T_a, T_b, factor)
     shown = [""] * len(names)
     for group in in_one_place(T_a[:, :3, 3], 0.5 * size):  # one label for frames that stand in one place

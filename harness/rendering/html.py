@@ -143,11 +143,11 @@ def legend() -> list[tuple[str, str]]:
 
 def _worst(report: Report) -> tuple[FrameResult, FrameResult] | None:
     """The frames that are furthest off, over their source's tolerance: in position, and in rotation."""
-    found = [(f, s.tolerance) for s in report.sources for f in s.frames]
-    if not found:
+    frames = [(f, s.tolerance) for s in report.sources for f in s.frames]
+    if not frames:
         return None
-    by_position = max(found, key=lambda pair: pair[0].position.max / max(pair[1].position, TINY))
-    by_rotation = max(found, key=lambda pair: pair[0].rotation.max / max(pair[1].rotation, TINY))
+    by_position = max(frames, key=lambda pair: pair[0].position.max / max(pair[1].position, TINY))
+    by_rotation = max(frames, key=lambda pair: pair[0].rotation.max / max(pair[1].rotation, TINY))
     return by_position[0], by_rotation[0]
 
 

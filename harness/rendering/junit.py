@@ -72,10 +72,10 @@ def _invalid(report: Report, source: Source) -> TestCase:
     return case
 
 
-def _regression(report: Report, found: Regression) -> TestCase:
+def _regression(report: Report, regression: Regression) -> TestCase:
     """A strict run's own case: nothing grew since it was accepted."""
-    case = _case(report, f"nothing grew since {found.accepted}", "regression")
-    if lines := worsened(found):
+    case = _case(report, f"nothing grew since {regression.accepted}", "regression")
+    if lines := worsened(regression):
         failure = Failure(plain(lines[0]))
         failure.text = "\n".join(plain(line) for line in [*lines, report.settings.command])
         case.result = [failure]

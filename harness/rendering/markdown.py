@@ -77,9 +77,9 @@ def _parameters(report: Report) -> list[str]:
     marked = [p for p in side.rows if p.marked]
     if not marked:
         return [f"- canonical parameters: all {len(side.rows)} are the same in the table and in the URDF"]
-    told = [f"{p.parameter} of {p.subject} by {difference(p)}" for p in marked[:OTHERS]]
+    texts = [f"{p.parameter} of {p.subject} by {difference(p)}" for p in marked[:OTHERS]]
     more = f"; and {len(marked) - OTHERS} more" if len(marked) > OTHERS else ""
-    return [f"- canonical parameters: {len(marked)} of {len(side.rows)} differ, URDF less table: {_md('; '.join(told))}{more}"]
+    return [f"- canonical parameters: {len(marked)} of {len(side.rows)} differ, URDF less table: {_md('; '.join(texts))}{more}"]
 
 
 def _since(report: Report) -> list[str]:

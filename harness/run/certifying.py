@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 
 from harness.certificate.certify import Bounds, Evaluate, Sampled, certify, found_from, rounding_of, sample, tighter
-from harness.certificate.interpolation import Axis, grid, weights
+from harness.certificate.interpolation import GRID_LIMIT, Axis, grid, weights
 from harness.certificate.joint_axes import UncertifiableError, joint_axes
 from harness.certificate.links import Link, SampledLinks, certify_links, sample_links
 from harness.comparison.components import components, mapped
@@ -20,8 +20,6 @@ from harness.run.binding import Bound
 from harness.run.outcome import Certified, Outcome, Run
 from harness.se3 import Array
 from harness.workers.pool import Workers
-
-GRID_LIMIT = 4096
 
 Certify: TypeAlias = "Callable[[Outcome], Certified]"
 

@@ -120,12 +120,12 @@ def table(reference: str, sources: Sequence[str], absent: Mapping[str, str], q: 
     for row in rows:
         by_frame.setdefault(row.frame, {})[row.source] = row
     lines = ["<tr>" + cell("frame", "th") + "".join(cell(name, "th") for name in sources) + "</tr>"]
-    for frame, found in by_frame.items():
+    for frame, by_source in by_frame.items():
         cells = [cell(frame, "th")]
         for name in sources:
-            one = found.get(name)
-            said = f"{'' if one.within else '✗ '}{metres(one.position)}, {radians(one.rotation)}" if one else ""
-            cells.append(cell(said, style="font-weight:700" if one and not one.within else ""))
+            one = by_source.get(name)
+            text = f"{'' if one.within else '✗ '}{metres(one.position)}, {radians(one.rotation)}" if one else ""
+            cells.append(cell(text, style="font-weight:700" if one and not one.within else ""))
         lines.append("<tr>" + "".join(cells) + "</tr>")
     outside = sorted({row.source for row in rows if not row.within})
     head = f"q = {numbers(q)}; off {reference}; outside tolerance: {', '.join(outside) or 'none'}"

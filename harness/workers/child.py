@@ -19,7 +19,7 @@ from typing import Any
 
 import psutil
 
-TAIL = 4096
+TAIL = 4096  # bytes of its stderr that are kept
 LOOK_UP = 0.5  # seconds between two looks at whether it still runs
 LONGEST_LINE = 16_000_000
 PIPE_BYTES = 1 << 20
@@ -33,7 +33,7 @@ class ChildError(Exception):
 class Child:
     """One running command. Not safe for several threads at once.
 
-    `over` is set by whoever kills it for using too much memory, and is then the reason it ended.
+    `kill_reason` is set by whoever kills it for using too much memory, and is then why it ended.
     """
 
     def __init__(self, command: Sequence[str], group: int, cwd: Path | None = None, env: Mapping[str, str] | None = None) -> None:
@@ -46,9 +46,9 @@ class Child:
             self.process = subprocess.Popen(command, bufsize=0, stdin=pipe, stdout=pipe, stderr=pipe, cwd=cwd, env=env, **joining)
         except (OSError, ValueError, subprocess.SubprocessError) as error:
             raise ChildError(f"cannot start {command[0]!r}: {error}") from error
-        self.command, self.cwd, self.over = tuple(command), cwd, ""
+        self.command, self.cwd, self.kill_reason = tuple(command), cwd, ""
         self._tail = b""
-        self._surplus = b""  # what came behind a line
+        self._surplus = b""  # what came after a line
         self._selector = selectors.DefaultSelector()
         streams = (self.process.stdin, self.process.stdout, self.process.stderr)
         self._stdin, self._stdout, self._stderr = (stream.fileno() for stream in streams if stream is not None)
@@ -104,9 +104,9 @@ class Child:
             self._selector.register(self._stdin, selectors.EVENT_WRITE)
         try:
             while not taken or len(data):
-                left = end - time.monotonic()
-                ready = self._selector.select(min(max(left, 0.0), LOOK_UP))
-                if not ready and left <= 0.0:
+                remaining = end - time.monotonic()
+                ready = self._selector.select(min(max(remaining, 0.0), LOOK_UP))
+                if not ready and remaining <= 0.0:
                     raise ChildError(self._story(f"did not answer within {timeout:.3g} s", so_far()))
                 if not ready and self.process.poll() is not None:
                     raise EOFError  # it has ended, and something it started holds on to the pipe
@@ -147,8 +147,8 @@ class Child:
             code = self.process.wait(2.0)
         except subprocess.TimeoutExpired:
             return "closed its stdout and went on running"
-        if self.over:
-            return self.over
+        if self.kill_reason:
+            return self.kill_reason
         return ending(code)
 
     def _story(self, what: str, so_far: str) -> str:

@@ -21,6 +21,8 @@ from harness.engines.requirements import install_line, unmet
 from harness.errors import EngineUnavailable
 
 SYSTEM_PYTHON = "/usr/bin/python3"
+# Variables that set to 1 keep numerical libraries to one thread: the cores are shared among processes, not fought over.
+THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class Installed(BaseModel):
@@ -64,14 +66,14 @@ def write_manifest(manifest: Manifest) -> None:
 
 
 @dataclass(frozen=True)
-class Found:
+class Interpreter:
     """Where an adapter runs: the interpreter, and the versions of its libraries there."""
 
     python: str
     versions: dict[str, str]
 
 
-def where(adapter: type[Engine]) -> Found:
+def where(adapter: type[Engine]) -> Interpreter:
     """Where this adapter can run. Raises EngineUnavailable with the install line.
 
     This environment if it meets the requirements, then the one built for the adapter; or the system's Python.
@@ -79,11 +81,11 @@ def where(adapter: type[Engine]) -> Found:
     if adapter.debian:
         if problem := system_problem(adapter.imports):
             raise EngineUnavailable(adapter.source, problem, install_line(adapter))
-        return Found(SYSTEM_PYTHON, debian_versions(adapter.debian))
+        return Interpreter(SYSTEM_PYTHON, debian_versions(adapter.debian))
     versions = adapter.versions()
     why = unmet(adapter, versions)
     if not why:
-        return Found(sys.executable, versions)
+        return Interpreter(sys.executable, versions)
     built = read_manifest().engines.get(adapter.source)
     if built is not None:
         if built.problem:
@@ -93,7 +95,7 @@ def where(adapter: type[Engine]) -> Found:
         elif not Path(built.python).is_file():
             why = f"its environment is gone: no {built.python}"
         else:
-            return Found(built.python, built.versions)
+            return Interpreter(built.python, built.versions)
     raise EngineUnavailable(adapter.source, why, install_line(adapter))
 
 

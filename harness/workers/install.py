@@ -37,7 +37,7 @@ from harness.workers.environments import (
 )
 from harness.workers.pool import Workers
 
-Say: TypeAlias = Callable[[str], None]
+Progress: TypeAlias = Callable[[str], None]  # takes one line of text
 
 TIMEOUT = 1800.0  # seconds for one pip or apt-get
 
@@ -49,19 +49,31 @@ ONE_JOINT = UrdfText(
 ONE_ROW = DHTable((DHRow(name="j", kind="revolute", a=0.5, alpha=0.0, d=0.25, theta=0.0),))
 
 
-def install(adapters: Sequence[type[Engine]], constraints: Path | None, say: Say) -> dict[str, Installed]:
-    """Make each engine available; what became of it by source. Engines that this environment can run are left to it."""
+def install(adapters: Sequence[type[Engine]], constraints: Path | None, progress: Progress) -> dict[str, Installed]:
+    """Make each engine available. Engines that this environment can run are left to it.
+
+    Args:
+        adapters: the engines.
+        constraints: a constraints file for pip, or None.
+        progress: is given a line for each step, and for each engine what became of it.
+
+    Returns:
+        What became of each engine, by source name.
+
+    Raises:
+        InputError: the cache folder cannot be written to.
+    """
     done: dict[str, Installed] = {}
     with _locked():
         for adapter in adapters:
-            entry = _system(adapter, say) if adapter.debian else _here(adapter) or _isolated(adapter, constraints, say)
+            entry = _system(adapter, progress) if adapter.debian else _here(adapter) or _isolated(adapter, constraints, progress)
             done[adapter.source] = entry
             if not adapter.debian and entry.python != sys.executable:
                 manifest = read_manifest()
                 manifest.engines[adapter.source] = entry
                 write_manifest(manifest)
             versions = ", ".join(f"{k} {v}" for k, v in entry.versions.items()) or "built in"
-            say(f"{adapter.source}: {f'NOT INSTALLED: {entry.problem}' if entry.problem else versions}")
+            progress(f"{adapter.source}: {f'NOT INSTALLED: {entry.problem}' if entry.problem else versions}")
     return done
 
 
@@ -85,13 +97,13 @@ def _here(adapter: type[Engine]) -> Installed | None:
     return Installed(python=sys.executable, requirements=list(adapter.requirements), versions=adapter.versions())
 
 
-def _system(adapter: type[Engine], say: Say) -> Installed:
+def _system(adapter: type[Engine], progress: Progress) -> Installed:
     """Debian packages for the system's Python; only root can install them."""
     if problem := system_problem(adapter.imports):
         line = ["apt-get", "install", "--yes", *adapter.debian]
         if shutil.which("apt-get") is None or os.geteuid() != 0:
             return Installed(problem=f"{problem}; as root: {' '.join(line)}")
-        say(f"{adapter.source}: {' '.join(line)}")
+        progress(f"{adapter.source}: {' '.join(line)}")
         quiet = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
         # The first attempt may fail for want of package lists.
         if _run(line, quiet) and (failed := _run(["apt-get", "update"], quiet) or _run(line, quiet)):
@@ -102,19 +114,19 @@ def _system(adapter: type[Engine], say: Say) -> Installed:
     return Installed(python=SYSTEM_PYTHON, versions=debian_versions(adapter.debian), problem=_try_out(adapter))
 
 
-def _isolated(adapter: type[Engine], constraints: Path | None, say: Say) -> Installed:
+def _isolated(adapter: type[Engine], constraints: Path | None, progress: Progress) -> Installed:
     """The first environment that takes the engine, or a new one."""
     requirements = list(adapter.requirements)
     known = read_manifest().engines
     used = sorted({str(Path(e.python).parent.parent) for e in known.values() if e.python and not e.problem})
     for folder in (Path(name) for name in used if Path(name).parent == cache_folder()):
-        say(f"{adapter.source}: trying {folder.name}")
+        progress(f"{adapter.source}: trying {folder.name}")
         entry = _add(adapter, folder, [*_constraint(constraints), *_freeze(folder)])
         if not entry.problem:
             return entry
     folder = next(f for f in (cache_folder() / f"env-{i}" for i in range(1, 1000)) if str(f) not in used)
     shutil.rmtree(folder, ignore_errors=True)  # left over from an attempt that failed
-    say(f"{adapter.source}: building {folder.name}")
+    progress(f"{adapter.source}: building {folder.name}")
     if problem := _run([sys.executable, "-m", "venv", str(folder)]):
         return Installed(requirements=requirements, problem=problem)
     return _add(adapter, folder, _constraint(constraints))
@@ -138,12 +150,10 @@ def _add(adapter: type[Engine], folder: Path, constraints: list[str]) -> Install
     """Install an engine's requirements into an environment, and try it out there."""
     python = str(folder / "bin" / "python")
     pip = [python, "-m", "pip", "install", "--quiet", "--no-input", "--disable-pip-version-check", "--prefer-binary"]
-    entry = Installed(python=python, requirements=list(adapter.requirements))
     problem = _run([*pip, *constraints, "numpy>=1.24", *adapter.requirements])
-    if not problem:
-        entry.versions = _versions(python, adapter)
-        problem = _try_out(adapter, python)
-    return entry.model_copy(update={"problem": problem})
+    versions = {} if problem else _versions(python, adapter)
+    problem = problem or _try_out(adapter, python)
+    return Installed(python=python, requirements=list(adapter.requirements), versions=versions, problem=problem)
 
 
 def _versions(python: str, adapter: type[Engine]) -> dict[str, str]:

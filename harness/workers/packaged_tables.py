@@ -41,10 +41,10 @@ def packaged_tables() -> dict[str, DHTable]:
 def packaged_table(name: str) -> DHTable:
     """One of them, whatever the case of its name. Raises InputError."""
     tables = packaged_tables()
-    found = [known for known in tables if known.lower() == name.lower()]
-    if not found:
+    matches = [known for known in tables if known.lower() == name.lower()]
+    if not matches:
         raise InputError(f"no robot {name!r} in roboticstoolbox.models.DH; {nearest(name, tables)}")
-    return tables[found[0]]
+    return tables[matches[0]]
 
 
 def _table(data: dict[str, Any]) -> DHTable:

@@ -19,25 +19,30 @@ from harness.engines.base import Description, Engine
 from harness.errors import EngineFailed
 from harness.workers import protocol
 from harness.workers.child import Child, ChildError
-from harness.workers.environments import own_environment, where
+from harness.workers.environments import THREAD_VARIABLES, own_environment, where
 from harness.workers.memory import MemoryWatch
 from harness.workers.process import Limits, ProcessEngine
 
 Result = TypeVar("Result")
 
 WATCH = 0.1  # seconds between two looks at a worker's memory
-# One thread a worker: the cores are shared among workers, not fought over by their libraries.
-ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class Workers:
-    """Context manager. `jobs` workers compute at a time (default: one a core); `in_process` runs adapters here instead.
+    """All workers of a run; a context manager that ends them.
 
     When the harness ends, in whatever way, the workers end with it: they are in the process group of a warden that kills
     the group as soon as the pipe to the harness closes.
     """
 
     def __init__(self, limits: Limits | None = None, jobs: int = 0, in_process: bool = False) -> None:
+        """Start nothing yet.
+
+        Args:
+            limits: what a worker may take; None for the usual limits.
+            jobs: how many workers compute at a time; 0 for one a core.
+            in_process: run adapters in this process instead.
+        """
         self.limits, self.in_process = limits or Limits(), in_process
         self.jobs = 1 if in_process else jobs or os.cpu_count() or 1
         self._pool = ThreadPoolExecutor(self.jobs)
@@ -69,13 +74,21 @@ class Workers:
                 self._warden.wait()
 
     def submit(self, work: Callable[[], Result]) -> Future[Result]:
-        """Run `work` when a core is free."""
+        """Run `work` when a core is free. Its result, or what it raises, is in the future."""
         return self._pool.submit(work)
 
     def load(self, adapter: type[Engine], description: Description, frames: Sequence[str], python: str = "") -> Engine:
-        """An engine on `description`, answering at those of `frames` it has; run by `python`, by default the one that has it.
+        """Start an engine on a description.
 
-        Raises EngineUnavailable (not installed) or EngineFailed (refuses the description).
+        Args:
+            adapter: the engine's adapter.
+            description: the description it is to place.
+            frames: the frames that are wanted; the engine answers at those it has.
+            python: the interpreter that runs it; by default the one that has its library.
+
+        Raises:
+            EngineUnavailable: the engine is not installed.
+            EngineFailed: it refuses the description, or its environment no longer has what it needs.
         """
         if self.in_process or not adapter.isolated:
             return requirements.build(adapter, description)
@@ -89,7 +102,11 @@ class Workers:
         return engine
 
     def settle(self, engines: Iterable[Engine]) -> None:
-        """Take back engines that are needed no more, at the end of a robot: of all workers, theirs alone may serve again."""
+        """End the work on one robot: keep the workers of these engines for the next one, and end all others.
+
+        Args:
+            engines: engines that have worked without fault and are needed no more.
+        """
         with self._lock:
             for engine in engines:
                 if isinstance(engine, ProcessEngine) and engine.idle:
@@ -103,9 +120,18 @@ class Workers:
     def start(
         self, source: str, command: Sequence[str], greeting: bytes, cwd: Path | None = None, adapter: type[Engine] | None = None
     ) -> ProcessEngine:
-        """A worker that runs this command, greeted: one that has served before, or a new one.
+        """Greet a worker that runs this command: one that has served before, or a new one.
 
-        Raises EngineFailed or EngineUnavailable.
+        Args:
+            source: source name.
+            command: program and arguments.
+            greeting: the first line it is sent, see `protocol.greeting`.
+            cwd: the folder it runs in; None for this process's own.
+            adapter: the adapter that it runs; None if it is a program of the user's.
+
+        Raises:
+            EngineUnavailable: its library is not installed.
+            EngineFailed: it cannot be started, or its answer is wrong.
         """
         with self._lock:
             idle = self._idle.get(_key(command, cwd), [])
@@ -113,7 +139,7 @@ class Workers:
         if served is not None:
             with contextlib.suppress(EngineFailed):  # what it served before may have spoilt it: a new one then
                 return ProcessEngine(source, served, protocol.AGAIN + greeting, self.limits, adapter)
-        env = {**dict.fromkeys(ONE_THREAD, "1"), **(own_environment(command[0]) if adapter else os.environ)}
+        env = {**dict.fromkeys(THREAD_VARIABLES, "1"), **(own_environment(command[0]) if adapter else os.environ)}
         try:
             with self._lock:
                 if self._closing.is_set():
@@ -139,7 +165,7 @@ class Workers:
         while not self._closing.wait(WATCH):
             for child in list(self._children):
                 if child.process.poll() is None and (used := watch.used(child.process.pid)) > self.limits.memory:
-                    child.over = f"used {_size(used)} of memory, {_size(self.limits.memory)} are allowed"
+                    child.kill_reason = f"used {_size(used)} of memory, {_size(self.limits.memory)} are allowed"
                     child.kill()
 
 

@@ -25,7 +25,16 @@ LONGEST_TEXT = 2000
 
 @dataclass(frozen=True)
 class Limits:
-    """What a worker may take: seconds to answer the greeting, seconds a block, bytes of memory. Raises InputError."""
+    """What a worker may take.
+
+    Attributes:
+        start: time to answer the greeting [s].
+        block: time for a block of configurations [s].
+        memory: memory of the worker and all that it has started [bytes].
+
+    Raises:
+        InputError: a limit is not above 0, or not finite.
+    """
 
     start: float = 120.0
     block: float = 120.0
@@ -39,7 +48,17 @@ class Limits:
 
 
 class Answer(BaseModel):
-    """A worker's answer to the greeting. Unknown keys are let through: a later version may have more."""
+    """A worker's answer to the greeting. Unknown keys are let through: a later version may have more.
+
+    Attributes:
+        protocol: name of the protocol.
+        version: version of the protocol.
+        joints: names of its joints, the columns of q.
+        frames: names of the frames it answers at.
+        name: what it calls itself.
+        versions: versions of its libraries.
+        again: whether it takes another greeting after this one.
+    """
 
     protocol: str
     version: int
@@ -74,12 +93,31 @@ class Answer(BaseModel):
 
 
 class ProcessEngine(Engine):
-    """A worker that has answered the greeting. `seconds` is its own computing time, `waited` the harness's for its blocks."""
+    """A worker that has answered the greeting.
+
+    Attributes:
+        is_program: whether it is a program of the user's, and no adapter.
+        child: its process.
+        seconds: its computing time, as it measures it itself [s].
+        waited: time spent on its blocks as seen from here [s].
+        died: how its process came to an end; empty if it did not.
+        started_in: time until it had answered the greeting [s].
+        idle: whether its process may be greeted again.
+    """
 
     def __init__(self, source: str, child: Child, greeting: bytes, limits: Limits, adapter: type[Engine] | None = None) -> None:
-        """Greet it. Raises EngineUnavailable (its library is not there) or EngineFailed.
+        """Greet it.
 
-        `adapter` is what it runs, if it is one of ours; a command of the user's may have the frames it likes.
+        Args:
+            source: source name.
+            child: its process.
+            greeting: the line it is sent, see `protocol.greeting`.
+            limits: what it may take.
+            adapter: the adapter that it runs; None for a program of the user's, which may have the frames it likes.
+
+        Raises:
+            EngineUnavailable: its library is not installed.
+            EngineFailed: it ended, did not answer in time, or its answer is wrong.
         """
         self.source = source
         self.traits = adapter.traits if adapter else ()
@@ -88,12 +126,12 @@ class ProcessEngine(Engine):
         self.child, self._limits = child, limits
         self._lock = threading.Lock()
         self.seconds = self.waited = 0.0
-        self.died = ""  # how its process came to an end, if it did
+        self.died = ""
         start = time.perf_counter()
         answer = self._greet(greeting)
         self.started_in = time.perf_counter() - start
         self.joints, self.frames, self._versions = tuple(answer.joints), tuple(answer.frames), answer.versions
-        self.idle = answer.again  # whether its child may be greeted again
+        self.idle = answer.again
 
     def _greet(self, greeting: bytes) -> Answer:
         try:
@@ -108,7 +146,7 @@ class ProcessEngine(Engine):
             raise EngineFailed(self.source, f"{error}{self.child.last_words()}") from error
 
     def finish(self, timeout: float) -> int | None:
-        """Let it end by itself. Returns its exit code, None if it goes on for longer than `timeout` [s]."""
+        """Let it end by itself, and wait for `timeout` [s]. Returns its exit code, None if it goes on."""
         return self.child.finish(timeout)
 
     def installed(self) -> dict[str, str]:
@@ -172,7 +210,16 @@ def _error(message: Any) -> str | None:
 
 
 def read_answer(source: str, text: bytes) -> Answer:
-    """Parse the answer line. Raises ValueError with what is wrong or the worker's own reason, or EngineUnavailable."""
+    """Parse a worker's answer to the greeting.
+
+    Args:
+        source: source name, for messages.
+        text: the line.
+
+    Raises:
+        ValueError: the answer is wrong, or the worker refused; the text says what, or the worker's own reason.
+        EngineUnavailable: the worker says that its library is not installed.
+    """
     message = _parsed(text)
     if message is None:
         got = text[:60].decode(errors="replace")
@@ -198,7 +245,12 @@ def read_answer(source: str, text: bytes) -> Answer:
 
 
 def explain_count(count: float, expected: int) -> str:
-    """What a wrong count at the head of a block says about its writer."""
+    """What a wrong count at the head of a block says about its writer.
+
+    Args:
+        count: the count that came.
+        expected: the number of configurations asked for.
+    """
     raw = np.array([count], protocol.FLOAT)
     text = raw.tobytes()
     if raw.byteswap()[0] == expected:

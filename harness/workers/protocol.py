@@ -19,14 +19,19 @@ from harness.engines.base import Description
 
 PROTOCOL = "fk-crosscheck"
 VERSION = 1
-MAX_BLOCK = 4096
+MAX_BLOCK = 4096  # configurations in one block, a limit of the protocol
 FAILED = -1.0
 FLOAT = np.dtype("<f8")
 AGAIN = np.zeros(1, FLOAT).tobytes()
 
 
 def greeting(description: Description, frames: tuple[str, ...]) -> bytes:
-    """The first line to a worker: the frames wanted, and the description it is asked to place."""
+    """The first line to a worker.
+
+    Args:
+        description: the description it is to place.
+        frames: names of the frames that are wanted.
+    """
     return line({"protocol": PROTOCOL, "version": VERSION, "frames": list(frames), "description": encode(description)})
 
 
@@ -36,7 +41,7 @@ def line(message: dict[str, Any]) -> bytes:
 
 
 def encode(description: Description) -> dict[str, Any]:
-    """A description as JSON; floats survive unchanged."""
+    """A description as JSON, see docs/worker-protocol.md. Floats survive unchanged."""
     if isinstance(description, DHTable):
         return {
             "kind": "dh",
@@ -54,7 +59,12 @@ def encode(description: Description) -> dict[str, Any]:
 
 
 def decode(message: dict[str, Any]) -> Description:
-    """The description of a greeting. Raises KeyError or ValueError for one that this version does not know."""
+    """The description of a greeting.
+
+    Raises:
+        KeyError: a part of it is missing.
+        ValueError: this version does not know its kind.
+    """
     kind = message["kind"]
     if kind == "dh":
         rows = tuple(

@@ -11,7 +11,7 @@ from typing import Any
 def tables() -> dict[str, Any]:
     """Every DHRobot that can be built without arguments and has numbers for its parameters, by class name."""
     rtb = importlib.import_module("roboticstoolbox")
-    found: dict[str, Any] = {}
+    robots: dict[str, Any] = {}
     for name, model in vars(rtb.models.DH).items():
         if not (isinstance(model, type) and issubclass(model, rtb.DHRobot)):
             continue
@@ -27,8 +27,8 @@ def tables() -> dict[str, Any]:
         except Exception as error:  # each model has a constructor of its own; one may want arguments, or be symbolic
             sys.stderr.write(f"{name} is no table of numbers: {type(error).__name__}: {error}\n")
         else:
-            found[name] = data
-    return found
+            robots[name] = data
+    return robots
 
 
 if __name__ == "__main__":

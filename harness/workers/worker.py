@@ -47,7 +47,7 @@ def _serve(adapter: str, source: BinaryIO, sink: BinaryIO) -> int:
     from harness.errors import EngineFailed, EngineUnavailable  # noqa: PLC0415
     from harness.workers import protocol  # noqa: PLC0415  (importable only now)
 
-    def say(message: dict[str, Any]) -> None:
+    def send(message: dict[str, Any]) -> None:
         sink.write(protocol.line(message))
         sink.flush()
 
@@ -57,13 +57,13 @@ def _serve(adapter: str, source: BinaryIO, sink: BinaryIO) -> int:
         try:
             engine: Engine = getattr(importlib.import_module(module), name)(protocol.decode(greeting["description"]))
         except EngineUnavailable as error:
-            say({"error": error.reason, "unavailable": True})
+            send({"error": error.reason, "unavailable": True})
             return 1
         except Exception as error:  # whatever a library raises is the answer
-            say({"error": error.reason if isinstance(error, EngineFailed) else f"{type(error).__name__}: {error}"})
+            send({"error": error.reason if isinstance(error, EngineFailed) else f"{type(error).__name__}: {error}"})
             return 1
         frames = tuple(frame for frame in greeting["frames"] if frame in engine.frames)
-        say(
+        send(
             {
                 "protocol": protocol.PROTOCOL,
                 "version": protocol.VERSION,

@@ -24,8 +24,9 @@ from harness.description.model import RobotModel, load_model
 from harness.description.tidy import angle_text, number_text, tidy_angle, tidy_length
 from harness.description.urdf_file import parse_urdf, read_urdf
 from harness.description.values import parse_number
+from harness.engines import requirements
 from harness.engines.dh_numpy import DHNumpy
-from harness.engines.registry import load_engine
+from harness.engines.urdf_pinocchio import UrdfPinocchio
 from harness.errors import InputError, UrdfError
 from harness.kinematics.canonical import canonical
 from harness.kinematics.screws import Chain, adjoint, exp, fit_gauge, log, rebuild, screws
@@ -122,7 +123,8 @@ def test_published_tables_come_back(models: dict[str, RobotModel], robot: str, c
 def test_the_gauge_between_two_bases(models: dict[str, RobotModel]) -> None:
     """base against base_link: half a turn about z, found from the screws alone."""
     model = models["ur5"]
-    bound = bind(load_engine("urdf:pinocchio", model), model, {})
+    assert model.urdf is not None
+    bound = bind(requirements.build(UrdfPinocchio, model.urdf), model, {})
     index = [f.name for f in model.frames.frames].index("tool0")
     S_base = screws(lambda q: bound.mapped(q)[index], [False] * 6, np.random.default_rng(0)).S
     T_link_base = se3.rotation("z", math.pi)

@@ -12,7 +12,7 @@ import pytest
 from harness.description.urdf import Urdf
 from harness.description.urdf_file import MAX_LINKS, parse_urdf, read_urdf
 from harness.description.urdf_lint import check, lint
-from harness.errors import UrdfError
+from harness.errors import InputError, UrdfError
 
 HERE = Path("arm.urdf")
 
@@ -210,3 +210,18 @@ def test_the_tree() -> None:
     assert urdf.between("a", "a") == ()
     with pytest.raises(KeyError, match="no link 'e'"):
         urdf.to_root("e")
+
+
+def test_a_link_that_is_required_and_not_there() -> None:
+    urdf = parse_urdf(robot(links("base_link", "tool0") + joint("j", "base_link", "tool0")), Path("arm.urdf"))
+    urdf.require_link("tool0", "--tip")
+    with pytest.raises(InputError, match=r"no link 'tool' in arm.urdf; did you mean 'tool0'") as refused:
+        urdf.require_link("tool", "--tip")
+    assert refused.value.key == "--tip"
+
+
+def test_the_lint_counts_no_engines() -> None:
+    """What is known of each engine is in its traits, and their number changes."""
+    followed = robot(links("a", "b", "c") + joint("j", "a", "b") + joint("k", "b", "c", "<mimic joint='j'/>"))
+    (message,) = [f.message for f in lint(parse_urdf(followed, Path("arm.urdf"))) if f.code == "mimic"]
+    assert message == "joint 'k' mimics 'j': many libraries ignore that; crosscheck engines lists them"

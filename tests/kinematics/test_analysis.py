@@ -23,7 +23,7 @@ from tests.helpers import assert_placements_close, transforms
 @given(st.lists(transforms, min_size=6, max_size=6), st.lists(transforms, min_size=2, max_size=2))
 def test_mapped_is_base_inverse_times_frame_times_offset(frames: list[Array], offsets: list[Array]) -> None:
     raw = np.array(frames).reshape(2, 3, 4, 4)  # two configurations, three raw frames, the first of them the base
-    view = View((2, -1, 1), np.array([offsets[0], np.eye(4), offsets[1]]), 0)
+    view = View((2, None, 1), np.array([offsets[0], np.eye(4), offsets[1]]), 0)
     got = matrices(mapped(components(raw), view))
     for k in range(2):
         for row, (slot, offset) in enumerate(((2, offsets[0]), (1, offsets[1]))):

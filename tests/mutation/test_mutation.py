@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
+import re
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from harness.description.model import RobotModel
 from harness.mutation import trial as trials
 from harness.mutation.controller import FaultyWorkers
 from harness.mutation.mutant import Cause, Mutant
-from harness.mutation.score import MutationScore, Trial, score
+from harness.mutation.numbers import of_urdf
+from harness.mutation.score import MutationScore, Outcome, Trial, score, show
 from harness.mutation.trial import mutants_of, try_out
 from harness.report.document import Report
 from harness.report.explanation import OneChange
@@ -113,6 +117,29 @@ def test_a_gate_that_sees_nothing_misses(
     (one,) = tried(models["ur5"], named(models["ur5"], "d of elbow_joint + 1 mm"), workers)
     assert one.outcome == "missed"
     assert score([one], 1, 0.0, []).exit_code == 1
+
+
+def test_the_tables_show_every_outcome() -> None:
+    outcomes: tuple[Outcome, ...] = ("caught", "missed", "below the floor", "left alone", "false alarm", "refused")
+    trials = [
+        Trial(robot="arm", source="s", mutant=f"m{i}", side="table", operator="o", outcome=outcome, note="a note")
+        for i, outcome in enumerate(outcomes)
+        for _ in range(i + 1)
+    ]
+    console = Console(file=io.StringIO(), width=200)
+    show(score(trials, 1, 0.0, []), console)
+    assert isinstance(console.file, io.StringIO)
+    head, row, *rest = console.file.getvalue().splitlines()
+    assert re.split(r"\s{2,}", head.strip()) == [
+        "robot", "caught", "missed", "below the floor", "equivalent, not flagged", "false alarms", "refused", "cause named",
+    ]  # fmt: skip
+    assert re.split(r"\s{2,}", row.strip()) == ["arm", "1", "2", "3", "4", "5", "6", "0 of 1, 0.0 %"]
+    assert "missed: arm, s: m1: a note" in rest
+
+
+def test_a_number_of_an_origin_is_named_as_explanations_name_it(models: dict[str, RobotModel]) -> None:
+    causes = {c.parameter for m in of_urdf(models["ur5"]) for c in m.causes}
+    assert causes == {"origin x", "origin y", "origin z", "roll", "pitch", "yaw"}
 
 
 def test_a_gate_that_flags_everything_raises_false_alarms(

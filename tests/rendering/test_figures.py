@@ -59,9 +59,9 @@ def test_magnified_differences_are_that_much_larger(T_a: Array, length: float, a
     ],
 )
 def test_the_factor_makes_a_difference_visible_and_no_more(off: Array, factor: float) -> None:
-    found = pose((ARM[0], ARM[0]), (ARM[1], ARM[1]), (ARM[2], ARM[2] @ off))
-    assert _factor(found) == factor
-    T_a, T_b = _placements(found)
+    pairs = pose((ARM[0], ARM[0]), (ARM[1], ARM[1]), (ARM[2], ARM[2] @ off)).frames
+    assert _factor(pairs) == factor
+    T_a, T_b = _placements(pairs)
     moved = se3.position_error(T_a, _magnified(T_a, T_b, factor)).max()
     assert moved <= max(2.0 * SEEN, float(se3.position_error(T_a, T_b).max()))
 
