@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 
 from harness.report.document import Report, Source
-from harness.report.text import changed_text, difference, for_all, metres, moved_text, numbers, plain, radians, why
+from harness.report.sentences import changed_text, difference, for_all, moved_text, why
+from harness.report.text import metres, numbers, plain, radians
 
 _ENTITY = {"<": "&lt;", ">": "&gt;", "&": "&amp;"}
 MARK = {0: "PASS", 1: "FAIL", 3: "INCOMPLETE"}

@@ -7,7 +7,8 @@ from rich.table import Table
 from rich.text import Text
 
 from harness.report.document import Report, Source
-from harness.report.text import changed_text, for_all, metres, moved_text, numbers, plain, radians, why
+from harness.report.sentences import changed_text, for_all, moved_text, why
+from harness.report.text import metres, numbers, plain, radians
 
 _STYLE = {0: "bold green", 1: "bold red", 3: "bold yellow"}
 MAX_REASONS = 6

@@ -16,7 +16,7 @@ from harness.errors import InputError
 from harness.report.document import PublishedResult, Report, Source
 from harness.report.parts import NonNegative, Part
 from harness.report.regression import Changed, Moved, Quantity, Regression
-from harness.report.text import worsened
+from harness.report.sentences import worsened
 
 FOLDER = "accepted"
 Pair = tuple[NonNegative, NonNegative]  # position [m], rotation [rad]
