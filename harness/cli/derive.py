@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import cast
 
 import click
-from rich.table import Table
 from rich.text import Text
 
 from harness.cli.console import console
@@ -23,6 +22,7 @@ from harness.description.urdf_file import read_urdf
 from harness.description.urdf_lint import check
 from harness.difference.operands import only_leaf
 from harness.rendering.files import write
+from harness.rendering.tables import bare_table
 from harness.report.document import Report
 from harness.report.text import plain
 from harness.run.options import Options
@@ -69,9 +69,7 @@ def verify(derived: Derived, name: str, source: str, out: Path | None) -> Report
 def _show(derived: Derived) -> None:
     out = console()
     out.print(Text(f"{plain(derived.base)} to {plain(derived.tip)}, {derived.table.convention} DH, metres and radians"))
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
-    for column in ("joint", "type", "a", "alpha", "d", "theta"):
-        table.add_column(column, overflow="fold")
+    table = bare_table("joint", "type", "a", "alpha", "d", "theta")
     for row in derived.table.rows:
         cells = (row.name, row.kind, number_text(row.a), angle_text(row.alpha), number_text(row.d), angle_text(row.theta))
         table.add_row(*(Text(plain(cell)) for cell in cells))

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import cast
 
 import click
-from rich.table import Table
 from rich.text import Text
 
 from harness.cause.changes import amount
@@ -21,6 +20,7 @@ from harness.difference.operands import read_operand
 from harness.errors import InputError
 from harness.kinematics.invariants import Difference
 from harness.kinematics.side_by_side import COLUMNS, Unit, less, turned
+from harness.rendering.tables import bare_table
 from harness.report.text import metres, plain, radians
 
 CHANGED = 1e-9
@@ -108,8 +108,7 @@ def _tables(found: Diff) -> None:
         Text(plain(f"canonical {found.convention} DH: A = {found.a.label}, B = {found.b.label}; differences B - A")),
         soft_wrap=True,
     )
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
-    table.add_column("joint", overflow="fold")
+    table = bare_table("joint")
     for name, unit in COLUMNS:
         for head in (f"A {name} [{'mm' if unit == 'm' else 'deg'}]", f"B {name}", "difference"):
             table.add_column(head, justify="right")
@@ -161,9 +160,7 @@ def identify_command(robot: str, models: Path | None, base: str | None, tip: str
         Text(plain(f"{operand.label}: {len(kinds)} joints, {kinds}; base, tool, joint signs and zero offsets aside")),
         soft_wrap=True,
     )
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
-    for column in ("known table", "largest length difference", "largest angle difference", "joints that turn the other way"):
-        table.add_column(column, overflow="fold")
+    table = bare_table("known table", "largest length difference", "largest angle difference", "joints that turn the other way")
     for one in found[:most]:
         flipped = ", ".join(name for name, sign in zip(operand.joints, one.signs, strict=True) if sign < 0)
         table.add_row(*(Text(plain(cell)) for cell in (one.name, _largest(one.length), _largest(one.angle), flipped)))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 from rich.tree import Tree
 
@@ -16,6 +15,7 @@ from harness.description.urdf_file import read_urdf
 from harness.description.urdf_lint import lint
 from harness.engines.registry import registered
 from harness.errors import EngineUnavailable
+from harness.rendering.tables import bare_table
 from harness.report.text import numbers, plain
 from harness.workers.environments import where
 
@@ -41,9 +41,7 @@ def show_frames(robot: str, models: Path, console: Console) -> int:
 
 
 def _show_dh(model: RobotModel, console: Console) -> None:
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
-    for column in ("DH frame", "row", "type", "a [m]", "alpha [rad]", "d [m]", "theta [rad]", "mapped to"):
-        table.add_column(column, overflow="fold")
+    table = bare_table("DH frame", "row", "type", "a [m]", "alpha [rad]", "d [m]", "theta [rad]", "mapped to")
     for label in model.table.frames:
         row = model.table.rows[int(label) - 1] if label.isdigit() and label != "0" else None
         cells = (row.name, row.kind, *(f"{x:.9g}" for x in (row.a, row.alpha, row.d, row.theta))) if row else ("",) * 6

@@ -7,10 +7,10 @@ from collections.abc import Iterable, Sequence
 from typing import Literal
 
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from harness.mutation.mutant import Mutant
+from harness.rendering.tables import bare_table
 from harness.report.parts import Part
 from harness.report.text import plain
 
@@ -135,9 +135,9 @@ def score(trials: Sequence[Trial], every: int, seconds: float, left_out: list[st
 def show(result: MutationScore, console: Console, most: int = 40) -> None:
     """Print the tables, then the first `most` trials that are not as they should be."""
     for title, tallies in (("robot", result.by_robot), ("source", result.by_source), ("operator", result.by_operator)):
-        table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
-        for column in (title, *COLUMNS):
-            table.add_column(column, justify="left" if column == title else "right", overflow="fold")
+        table = bare_table(title)
+        for column in COLUMNS:
+            table.add_column(column, justify="right", overflow="fold")
         for name, t in (*tallies.items(), ("all", result.total)):
             share = f"{t.named} of {t.caught}" + (f", {100.0 * t.named / t.caught:.1f} %" if t.caught else "")
             cells = (t.caught, t.missed, t.below, t.left_alone, t.false_alarms, t.refused)

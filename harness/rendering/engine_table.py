@@ -6,9 +6,9 @@ from collections import Counter
 from collections.abc import Sequence
 
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
+from harness.rendering.tables import bare_table
 from harness.report.document import Report, Source
 from harness.report.text import metres, plain
 from harness.report.verdicts import Verdict
@@ -20,9 +20,7 @@ def show_engine_table(reports: Sequence[Report], console: Console) -> None:
     for report in reports:
         for source in report.sources:
             by_engine.setdefault(source.name, []).append((report, source))
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
-    for column in ("engine", "version", "verdict", "largest, accepted aside", ""):
-        table.add_column(column, overflow="fold")
+    table = bare_table("engine", "version", "verdict", "largest, accepted aside", "")
     for name, entries in by_engine.items():
         counts = Counter(source.verdict for _, source in entries)
         verdict = ", ".join(f"{count} {text}" for text, count in counts.items())

@@ -18,21 +18,9 @@ from harness.rendering.markdown import render_markdown
 from harness.report.document import PairResult, Report, Source
 from harness.report.explanation import Explanation
 from harness.report.model_parts import Link, ParameterPair
+from harness.report.sentences import change_of, changed_text, difference, for_all, moved_text
 from harness.report.source_parts import FrameResult
-from harness.report.text import (
-    change_of,
-    changed_text,
-    degrees,
-    difference,
-    for_all,
-    metres,
-    moved_text,
-    numbers,
-    plain,
-    point,
-    quantity,
-    radians,
-)
+from harness.report.text import degrees, metres, numbers, plain, point, quantity, radians
 from harness.report.verdicts import Verdict
 
 # ColorBrewer YlOrBr: light to dark, told apart by the colour-blind, always with the number beside it.

@@ -6,8 +6,9 @@ from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
 from harness.report.document import PublishedResult, Report, Source
 from harness.report.regression import Regression
+from harness.report.sentences import why, worsened
 from harness.report.source_parts import FrameResult
-from harness.report.text import metres, numbers, plain, radians, why, worsened
+from harness.report.text import metres, numbers, plain, radians
 from harness.report.verdicts import Verdict
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 
 from harness.report.document import Report, Source
-from harness.report.text import changed_text, difference, for_all, metres, moved_text, numbers, plain, radians, why
+from harness.report.sentences import changed_text, difference, for_all, moved_text, why
+from harness.report.text import metres, numbers, plain, radians
 from harness.report.verdicts import Verdict
 
 _ENTITY = {"<": "&lt;", ">": "&gt;", "&": "&amp;"}

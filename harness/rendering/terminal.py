@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
+from harness.rendering.tables import bare_table
 from harness.report.document import Report, Source
-from harness.report.text import changed_text, for_all, metres, moved_text, numbers, plain, radians, why
+from harness.report.sentences import changed_text, for_all, moved_text, why
+from harness.report.text import metres, numbers, plain, radians
 from harness.report.verdicts import Verdict
 
 _STYLE = {0: "bold green", 1: "bold red", 3: "bold yellow"}
@@ -21,9 +22,7 @@ def show(report: Report, console: Console) -> None:
     """Print verdict, one row a source, and where each disagreement is."""
     code = report.verdict.exit_code
     console.print(Text(_WORD[code], style=_STYLE[code]), Text(plain(report.verdict.sentence)), soft_wrap=True)
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
-    for column in ("source", "verdict", "worst frame", "position", "rotation", "for all q", "tolerance", "size of"):
-        table.add_column(column, overflow="fold")
+    table = bare_table("source", "verdict", "worst frame", "position", "rotation", "for all q", "tolerance", "magnitude")
     for source in report.sources:
         if not source.reference:
             table.add_row(*_row(source))

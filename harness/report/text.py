@@ -1,16 +1,10 @@
-"""Numbers and names as people read them; shared by every format."""
+"""Plain numbers and names as people read them; shared by every format. Nothing of the report document is imported here."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Iterable
-
-from harness.report.document import Source
-from harness.report.model_parts import ParameterPair
-from harness.report.regression import Changed, Moved, Regression
-
-MAX_SAME = 3
 
 # C0 and C1 controls, line separators and bidirectional overrides change more than their own letters; surrogates and
 # non-characters cannot be written to XML.
@@ -41,36 +35,6 @@ def quantity(x: float, unit: str) -> str:
     return metres(x) if unit == "m" else radians(x)
 
 
-def change_of(pair: ParameterPair, value: float) -> str:
-    """A canonical number in mm or degrees, nine digits, rounding left off."""
-    scale = 1e3 if pair.unit == "m" else 180.0 / math.pi
-    return f"{round(value * scale, 6) + 0.0:.9g}"
-
-
-def difference(pair: ParameterPair) -> str:
-    """`-0.301 mm`, `+0.0002 deg`: what the URDF has more than the table."""
-    scale, unit = (1e3, "mm") if pair.unit == "m" else (180.0 / math.pi, "deg")
-    return f"{pair.difference * scale:+.6g} {unit}"
-
-
-def moved_text(moved: Moved) -> str:
-    """`urdf:pinocchio at tool0: position 1e-12 m, now 0.301 mm`."""
-    before, after = quantity(moved.before, moved.unit), quantity(moved.after, moved.unit)
-    return f"{moved.source} at {moved.frame}: {moved.quantity} {before}, now {after}"
-
-
-def changed_text(changed: Changed) -> str:
-    """`urdf:pinocchio: agrees, now disagrees`."""
-    return f"{changed.what}: {changed.before}, now {changed.after}"
-
-
-def worsened(found: Regression) -> list[str]:
-    """What a strict run fails for, a line each."""
-    lines = [found.problem] if found.problem else []
-    lines += [moved_text(m) for m in found.grown]
-    return lines + [changed_text(c) for c in found.changed if c.worse]
-
-
 def numbers(values: Iterable[float], digits: int = 6) -> str:
     """`[0.2, -1.1, 0]`."""
     return "[" + ", ".join(f"{0.0 if v == 0 else v:.{digits}g}" for v in values) + "]"
@@ -84,31 +48,3 @@ def point(values: Iterable[float]) -> str:
 def degrees(values: Iterable[float]) -> str:
     """Angles in degrees: `[90, 0, 30]`."""
     return numbers([round(math.degrees(v), 6) for v in values])
-
-
-def why(source: Source) -> list[str]:
-    """The explanation, one change a line, each with what would do the same; then what it leaves. Empty if there is none."""
-    found = source.explanation
-    if found is None:
-        return []
-    if not found.changes:
-        return [f"unexplained: {found.unexplained}"]
-    lines = []
-    for change in found.changes:
-        lines.append(change.text)
-        if change.equivalents:
-            more = f"; and {len(change.equivalents) - MAX_SAME} more" if len(change.equivalents) > MAX_SAME else ""
-            same = "; ".join(other.text for other in change.equivalents[:MAX_SAME])
-            lines.append(f"  the same: {same}{more}")
-    before = f"{metres(found.before_position)}, {radians(found.before_rotation)}"
-    lines.append(f"  tried: {before} before, {metres(found.after_position)}, {radians(found.after_rotation)} after")
-    return lines
-
-
-def for_all(source: Source) -> str:
-    """The bound over every configuration at the frame where it is largest: `<= 1.6e-11 m`, or `refused`."""
-    if source.certificate is None:
-        return ""
-    if source.certificate.status == "refused":
-        return "refused"
-    return f"<= {metres(max(bound.position_upper for bound in source.certificate.frames))}"

@@ -7,7 +7,8 @@ from collections.abc import Iterable, Sequence
 from harness.errors import ExitCode
 from harness.report import document as doc
 from harness.report.regression import Regression
-from harness.report.text import metres, radians, worsened
+from harness.report.sentences import worsened
+from harness.report.text import metres, radians
 from harness.report.verdicts import Verdict
 
 
