@@ -11,8 +11,8 @@ from concurrent.futures import ProcessPoolExecutor
 from importlib import metadata
 from pathlib import Path
 
-from harness.cli.derive import verify
 from harness.convert.derive import derive
+from harness.convert.verify import verify
 from harness.description.urdf_file import read_urdf
 from harness.description.urdf_lint import check
 from harness.errors import CrosscheckError

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from harness.cli.console import console
-from harness.cli.run import accepted_option, complete_robots, folders_of, models_option
+from harness.cli.shared import accepted_option, complete_robots, folders_of, models_option
 from harness.description.locate import default_models_dir
 from harness.description.model import load_model
 from harness.errors import InputError

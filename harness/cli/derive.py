@@ -1,10 +1,10 @@
-"""`crosscheck derive-dh` and `crosscheck export-urdf`: from a URDF to a DH table, and back."""
+"""`crosscheck derive-dh`: from a URDF to a DH table, with proof."""
 
 from __future__ import annotations
 
 import math
 import re
-import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
@@ -12,23 +12,28 @@ import click
 from rich.text import Text
 
 from harness.cli.console import console
+from harness.cli.shared import gathered
 from harness.convert.derive import Derived, derive
-from harness.convert.write_model import export_urdf, write_model
+from harness.convert.verify import verify
 from harness.description.dh import Convention
-from harness.description.locate import default_models_dir, find_model
-from harness.description.model import load_model
 from harness.description.tidy import angle_text, is_identity, number_text, transform_toml
 from harness.description.urdf_file import read_urdf
 from harness.description.urdf_lint import check
 from harness.difference.operands import only_leaf
-from harness.rendering.files import write
 from harness.rendering.tables import bare_table
-from harness.report.document import Report
 from harness.report.text import plain
-from harness.run.options import Options
-from harness.verdict.crosscheck import crosscheck
 
-SAMPLES = 200
+
+@dataclass(frozen=True, kw_only=True)
+class DeriveSettings:
+    """The options of `crosscheck derive-dh`; None stands for the default that its help gives."""
+
+    base: str | None
+    tip: str | None
+    convention: str
+    source: str
+    name: str | None
+    out: Path | None
 
 
 @click.command("derive-dh")
@@ -39,31 +44,24 @@ SAMPLES = 200
 @click.option("--source", default="urdf:pinocchio", show_default=True, help="Engine whose placements are believed.")
 @click.option("--name", help="Name of the robot model.  [default: the file's]")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder of robot models to write it to.")
-def derive_dh(
-    urdf_path: Path, base: str | None, tip: str | None, convention: str, source: str, name: str | None, out: Path | None
-) -> int:
+@gathered(DeriveSettings, "settings")
+def derive_dh(urdf_path: Path, settings: DeriveSettings) -> int:
     """Find the DH table of a chain in a URDF, and prove that it is the same robot.
 
     Exit code: that of cross-checking the result; 2 if no DH table exists.
     """
     urdf = read_urdf(urdf_path)
     check(urdf)
-    derived = derive(urdf, base or urdf.roots[0], tip or only_leaf(urdf), cast(Convention, convention), source)
-    robot = name or re.sub(r"[^A-Za-z0-9_.-]", "_", urdf_path.stem).lstrip("_.-") or "robot"
+    base, tip = settings.base or urdf.roots[0], settings.tip or only_leaf(urdf)
+    derived = derive(urdf, base, tip, cast(Convention, settings.convention), settings.source)
+    robot = settings.name or re.sub(r"[^A-Za-z0-9_.-]", "_", urdf_path.stem).lstrip("_.-") or "robot"
     _show(derived)
-    report = verify(derived, robot, source, out)
+    report = verify(derived, robot, settings.source, settings.out)
     sentence = report.verdict.sentence
     console().print(Text(plain(sentence), style="green" if report.verdict.exit_code == 0 else "red"), soft_wrap=True)
-    if out is not None:
-        console().print(Text(f"written to {plain(str(out / robot))}"), soft_wrap=True)
+    if settings.out is not None:
+        console().print(Text(f"written to {plain(str(settings.out / robot))}"), soft_wrap=True)
     return report.verdict.exit_code
-
-
-def verify(derived: Derived, name: str, source: str, out: Path | None) -> Report:
-    """Write the robot model (to a temporary folder, if `out` is None), read it back and cross-check it, with a certificate."""
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = write_model(derived, name, source, out or Path(temporary))
-        return crosscheck(load_model(folder), Options(samples=SAMPLES, seed=0, sources=(source,)))
 
 
 def _show(derived: Derived) -> None:
@@ -81,17 +79,3 @@ def _show(derived: Derived) -> None:
         out.print(Text(f"fixed by choice: {plain(direction)}", style="yellow"), soft_wrap=True)
     if math.isfinite(derived.residual):
         out.print(Text(f"the joint screws rebuild the chain to {derived.residual:.1e}", style="dim"))
-
-
-@click.command("export-urdf")
-@click.argument("robot", metavar="ROBOT")
-@click.option("--models", type=click.Path(path_type=Path), help="Folder of robot models.  [default: those of the package]")
-@click.option("--out", type=click.Path(path_type=Path), help="File to write to.  [default: standard output]")
-def export_urdf_command(robot: str, models: Path | None, out: Path | None) -> int:
-    """Write a robot model's DH table as a URDF: kinematics only, one link for each DH frame."""
-    text = export_urdf(load_model(find_model(robot, models or default_models_dir())))
-    if out is None:
-        click.echo(text, nl=False)
-    else:
-        write(out, text)
-    return 0

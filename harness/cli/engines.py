@@ -1,32 +1,21 @@
-"""`crosscheck engines`, `crosscheck engines install` and `crosscheck worker-check`."""
+"""`crosscheck engines` and `crosscheck engines install`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from itertools import chain
 from pathlib import Path
 
 import click
+from rich.console import Console
 from rich.text import Text
 
 from harness.cli.console import console
-from harness.cli.frames import show_engines
-from harness.cli.run import complete_sources, models_option
-from harness.description.frames_file import EngineNames
-from harness.description.locate import default_models_dir, find_model
-from harness.description.model import RobotModel, load_model
+from harness.cli.shared import complete_sources
 from harness.engines.base import Engine
-from harness.engines.registry import adapter_of, description_of, registered
-from harness.errors import EngineFailed, EngineUnavailable, InputError
+from harness.engines.registry import adapter_of, registered
+from harness.errors import EngineUnavailable, InputError
 from harness.report.text import plain
-from harness.run.binding import bind
-from harness.run.naming import wanted_frames
-from harness.workers import protocol
-from harness.workers.conformance import Finding, examine
-from harness.workers.environments import cache_folder
+from harness.workers.environments import cache_folder, where
 from harness.workers.install import install
-from harness.workers.pool import Workers
-from harness.workers.process import Limits, ProcessEngine
 
 
 @click.group(invoke_without_command=True)
@@ -64,56 +53,20 @@ def _say(text: str) -> None:
     console().print(plain(text), markup=False, soft_wrap=True)
 
 
-@click.command("worker-check", context_settings={"ignore_unknown_options": True})
-@click.argument("command", nargs=-1, required=True, metavar="-- COMMAND...", type=click.UNPROCESSED)
-@click.option("--robot", default="ur5", show_default=True, help="Robot model whose description it is given.")
-@click.option("--name", default="worker", show_default=True, help="Name it goes by; with urdf: in front it is given the URDF.")
-@models_option
-@click.option("--start-timeout", type=float, default=10.0, show_default=True, help="Seconds for its answer to the greeting.")
-@click.option("--block-timeout", type=float, default=30.0, show_default=True, help="Seconds for a block of 4096.")
-def worker_check(
-    command: tuple[str, ...], robot: str, name: str, models: Path | None, start_timeout: float, block_timeout: float
-) -> int:
-    """Check that a program speaks the worker protocol, and say what is wrong. Exit code 0 if nothing is, else 1."""
-    model = load_model(find_model(robot, models or default_models_dir()))
-    words = [word.replace("{model}", str(model.folder.resolve())) for word in command]
-    greeting = protocol.greeting(description_of(name, model), wanted_frames(name, model))
-    first = "answers the greeting with one line of JSON"
-    with Workers(Limits(start_timeout, block_timeout)) as workers:
+def show_engines(out: Console) -> int:
+    """Print every registered engine: versions or the reason and the install line, then its traits."""
+    for name, entry in registered().items():
+        if entry.adapter is None:
+            out.print(Text(name, style="bold"), Text(f"broken: {plain(entry.problem)}", style="red"), soft_wrap=True)
+            continue
         try:
-            engine = workers.start(name, words, greeting)
-        except (EngineFailed, EngineUnavailable) as error:
-            return _tell([Finding(first, error.reason)])
-        turning = [_turns(joint, engine, model) for joint in engine.joints]
-        return _tell(chain([Finding(first), _names(engine, model)], examine(engine, turning)))
-
-
-def _turns(joint: str, engine: ProcessEngine, model: RobotModel) -> bool:
-    """Whether a joint of the worker is revolute in the robot model, as far as the model knows it."""
-    names = model.engine_names.get(engine.source, EngineNames()).joints
-    own = next((ours for ours, theirs in names.items() if theirs == joint), joint)
-    if own in model.table.joints:
-        return model.table.kind(own) == "revolute"
-    return model.urdf is not None and own in model.urdf.joints and model.urdf.joints[own].type != "prismatic"
-
-
-def _names(engine: ProcessEngine, model: RobotModel) -> Finding:
-    """Whether it uses the names of the robot model."""
-    what = f"knows the joints and frames of {model.name}"
-    try:
-        bound = bind(engine, model, {})
-    except EngineFailed as error:
-        return Finding(what, error.reason)
-    return Finding(f"{what}, all but {', '.join(bound.undeclared)}" if bound.undeclared else what)
-
-
-def _tell(findings: Iterable[Finding]) -> int:
-    code = 0
-    for finding in findings:
-        text = Text("ok    " if not finding.problem else "WRONG ", style="red" if finding.problem else "green")
-        text.append(plain(finding.what), style="default")
-        console().print(text, soft_wrap=True)
-        if finding.problem:
-            console().print(Text(f"      {plain(finding.problem)}"), soft_wrap=True)
-            code = 1
-    return code
+            versions = ", ".join(f"{k} {v}" for k, v in where(entry.adapter).versions.items()) or "built in"
+            out.print(Text(name, style="bold"), Text(versions, style="green"), soft_wrap=True)
+        except EngineUnavailable as error:
+            text = f"not installed: {error.reason}; {error.install}"
+            out.print(Text(name, style="bold"), Text(plain(text), style="yellow"), soft_wrap=True)
+        for trait in entry.adapter.traits:
+            when = f" [matters with: {trait.lint}]" if trait.lint else ""
+            out.print(Text(f"    {trait.text}{when}"), soft_wrap=True)
+            out.print(Text(f"        {trait.evidence}", style="dim"), soft_wrap=True)
+    return 0

@@ -1,62 +1,70 @@
-"""`crosscheck frames` and `crosscheck engines`: what is there, before anything is compared."""
+"""`crosscheck frames`: DH rows, the URDF's tree, and what is mapped to what."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import click
 from rich.console import Console
 from rich.text import Text
 from rich.tree import Tree
 
-from harness.description.locate import find_model
+from harness.cli.console import console
+from harness.cli.shared import complete_robots, models_option
+from harness.description.locate import default_models_dir, find_model
 from harness.description.model import RobotModel, load_model
 from harness.description.urdf import Urdf, UrdfJoint
 from harness.description.urdf_file import read_urdf
 from harness.description.urdf_lint import lint
-from harness.engines.registry import registered
-from harness.errors import EngineUnavailable
 from harness.rendering.tables import bare_table
 from harness.report.text import numbers, plain
-from harness.workers.environments import where
 
 
-def show_frames(robot: str, models: Path, console: Console) -> int:
+@click.command()
+@click.argument("robot", metavar="ROBOT|URDF", shell_complete=complete_robots)
+@models_option
+def frames(robot: str, models: Path | None) -> int:
+    """Show the frame tree: joint types, axes, and what each frame is mapped to."""
+    return show_frames(robot, models or default_models_dir(), console())
+
+
+def show_frames(robot: str, models: Path, out: Console) -> int:
     """Print the frame tree of a robot model or a URDF file. Returns 2 if the URDF is not a tree, else 0."""
     path = Path(robot)
     if path.is_file() or path.suffix in (".urdf", ".xacro", ".xml"):
         urdf = read_urdf(path)
         findings = lint(urdf)
-        _show_tree(urdf, {}, console)
+        _show_tree(urdf, {}, out)
     else:
         model = load_model(find_model(robot, models))
         findings = model.findings
-        _show_dh(model, console)
+        _show_dh(model, out)
         if model.urdf is not None:
-            _show_tree(model.urdf, _mapped(model), console)
+            _show_tree(model.urdf, _mapped(model), out)
     for finding in findings:
         style = {"error": "red", "warning": "yellow", "note": "dim"}[finding.level]
         where = f"line {finding.line}: " if finding.line else ""
-        console.print(Text(f"{finding.level}: {where}{plain(finding.message)}", style=style), soft_wrap=True)
+        out.print(Text(f"{finding.level}: {where}{plain(finding.message)}", style=style), soft_wrap=True)
     return 2 if any(f.level == "error" for f in findings) else 0
 
 
-def _show_dh(model: RobotModel, console: Console) -> None:
+def _show_dh(model: RobotModel, out: Console) -> None:
     table = bare_table("DH frame", "row", "type", "a [m]", "alpha [rad]", "d [m]", "theta [rad]", "mapped to")
     for label in model.table.frames:
         row = model.table.rows[int(label) - 1] if label.isdigit() and label != "0" else None
         cells = (row.name, row.kind, *(f"{x:.9g}" for x in (row.a, row.alpha, row.d, row.theta))) if row else ("",) * 6
         names = [f"{f.name} ({f.relation})" for f in model.frames.frames if f.dh == label]
         table.add_row(*(Text(plain(c)) for c in (label, *cells, ", ".join(names))))
-    console.print(Text(f"{model.name}, {model.table.convention} DH"))
-    console.print(table)
-    console.print()
+    out.print(Text(f"{model.name}, {model.table.convention} DH"))
+    out.print(table)
+    out.print()
 
 
-def _show_tree(urdf: Urdf, mapped: dict[str, str], console: Console) -> None:
+def _show_tree(urdf: Urdf, mapped: dict[str, str], out: Console) -> None:
     for root in urdf.roots:
         tree = Tree(_link(root, mapped))
         _grow(tree, urdf, root, mapped)
-        console.print(tree, soft_wrap=True)
+        out.print(tree, soft_wrap=True)
 
 
 def _mapped(model: RobotModel) -> dict[str, str]:
@@ -99,22 +107,3 @@ def _describe(joint: UrdfJoint) -> str:
     if joint.mimic:
         parts.append(f"mimics {joint.mimic.multiplier:g} * {joint.mimic.joint} + {joint.mimic.offset:g}")
     return ", ".join(parts)
-
-
-def show_engines(console: Console) -> int:
-    """Print every registered engine: versions or the reason and the install line, then its traits."""
-    for name, entry in registered().items():
-        if entry.adapter is None:
-            console.print(Text(name, style="bold"), Text(f"broken: {plain(entry.problem)}", style="red"), soft_wrap=True)
-            continue
-        try:
-            found = ", ".join(f"{k} {v}" for k, v in where(entry.adapter).versions.items()) or "built in"
-            console.print(Text(name, style="bold"), Text(found, style="green"), soft_wrap=True)
-        except EngineUnavailable as error:
-            text = f"not installed: {error.reason}; {error.install}"
-            console.print(Text(name, style="bold"), Text(plain(text), style="yellow"), soft_wrap=True)
-        for trait in entry.adapter.traits:
-            when = f" [matters with: {trait.lint}]" if trait.lint else ""
-            console.print(Text(f"    {trait.text}{when}"), soft_wrap=True)
-            console.print(Text(f"        {trait.evidence}", style="dim"), soft_wrap=True)
-    return 0

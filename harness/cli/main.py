@@ -3,69 +3,77 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 from typing import Any
 
 import click
-from click.shell_completion import get_completion_class
 
 from harness import __version__
-from harness.cli.accept import accept
-from harness.cli.console import complain, console
-from harness.cli.derive import derive_dh, export_urdf_command
-from harness.cli.diff import diff_command, identify_command
-from harness.cli.engines import engines, worker_check
-from harness.cli.frames import show_frames
-from harness.cli.mutate import mutate
-from harness.cli.run import complete_robots, models_option, run
-from harness.cli.view import view
-from harness.description.locate import default_models_dir
-from harness.errors import CrosscheckError, InputError
-from harness.rendering.files import prepare, write_rendered
-from harness.report.json_file import read_report
+from harness.cli.error_line import complain
+from harness.cli.lazy import LazyGroup, Place
+from harness.errors import CrosscheckError
 from harness.report.text import plain
 
+# The first sentence of each command's docstring stands here too: `crosscheck --help` imports none of the commands.
+COMMANDS = {
+    "accept": Place(
+        "harness.cli.accept", "accept",
+        "Put the numbers of the last reports of these robots (none: all) on file, to be committed.",
+    ),
+    "completion": Place(
+        "harness.cli.completion", "completion",
+        'Print the completion script of a shell, e.g. for bash: eval "$(crosscheck completion bash)".',
+    ),
+    "derive-dh": Place(
+        "harness.cli.derive", "derive_dh",
+        "Find the DH table of a chain in a URDF, and prove that it is the same robot.",
+    ),
+    "diff": Place(
+        "harness.cli.diff", "diff_command",
+        "Compare two mechanisms from base to tip, and say why they differ.",
+    ),
+    "engines": Place(
+        "harness.cli.engines", "engines",
+        "Show which engines are installed, their versions, how to install the others, and their traits.",
+    ),
+    "export-urdf": Place(
+        "harness.cli.export", "export_urdf_command",
+        "Write a robot model's DH table as a URDF: kinematics only, one link for each DH frame.",
+    ),
+    "frames": Place(
+        "harness.cli.frames", "frames",
+        "Show the frame tree: joint types, axes, and what each frame is mapped to.",
+    ),
+    "identify": Place(
+        "harness.cli.identify", "identify_command",
+        "Which known DH table this mechanism is, modulo base, tool, joint signs and zero offsets; nearest first.",
+    ),
+    "mutate": Place(
+        "harness.cli.mutate", "mutate",
+        "Put faults into robot models on purpose, and see what the gate makes of them.",
+    ),
+    "render": Place(
+        "harness.cli.render", "render",
+        "Render HTML, Markdown and JUnit from a report's JSON again.",
+    ),
+    "run": Place(
+        "harness.cli.run", "run",
+        "Cross-check robot models (names, or folders with a model.toml; none: all) and write reports.",
+    ),
+    "view": Place(
+        "harness.cli.view", "view",
+        "Show a robot's sources side by side in a local page, with a slider for each joint.",
+    ),
+    "worker-check": Place(
+        "harness.cli.worker_check", "worker_check",
+        "Check that a program speaks the worker protocol, and say what is wrong.",
+    ),
+}  # fmt: skip
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+
+@click.group(cls=LazyGroup, places=COMMANDS, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="crosscheck")
 def cli() -> None:
     """Cross-validate a robot's DH table against its URDF with every FK engine installed."""
-
-
-@cli.command()
-@click.argument("robot", metavar="ROBOT|URDF", shell_complete=complete_robots)
-@models_option
-def frames(robot: str, models: Path | None) -> int:
-    """Show the frame tree: joint types, axes, and what each frame is mapped to."""
-    return show_frames(robot, models or default_models_dir(), console())
-
-
-@cli.command()
-@click.argument("report", type=click.Path(path_type=Path), metavar="REPORT.json")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder to write to.  [default: beside the report]")
-def render(report: Path, out: Path | None) -> int:
-    """Render HTML, Markdown and JUnit from a report's JSON again."""
-    document = read_report(report)
-    folder = out or report.parent
-    prepare(folder)
-    for path in write_rendered(document, folder):
-        console().print(plain(str(path)), markup=False)
-    return 0
-
-
-@cli.command()
-@click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
-def completion(shell: str) -> int:
-    """Print the completion script of a shell, e.g. for bash: eval "$(crosscheck completion bash)"."""
-    script = get_completion_class(shell)
-    if script is None:
-        raise InputError(f"no completion for {shell}")
-    click.echo(script(cli, {}, "crosscheck", "_CROSSCHECK_COMPLETE").source())
-    return 0
-
-
-for command in (run, accept, view, engines, worker_check, derive_dh, export_urdf_command, diff_command, identify_command, mutate):
-    cli.add_command(command)
 
 
 def main() -> None:

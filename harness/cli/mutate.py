@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from harness.cli.console import console
-from harness.cli.run import complete_robots, complete_sources, folders_of, models_option, progress_bar
+from harness.cli.shared import complete_robots, complete_sources, folders_of, models_option, progress_bar
 from harness.description.locate import default_models_dir
 from harness.errors import InputError
 from harness.mutation.run import SOURCES, run_mutants

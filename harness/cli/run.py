@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import shlex
-import sys
-from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
-from click.shell_completion import CompletionItem
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from harness.cli.console import complain, console
-from harness.description.locate import default_models_dir, find_model, model_folders
+from harness.cli.console import console
+from harness.cli.error_line import complain
+from harness.cli.shared import (
+    accepted_option,
+    complete_robots,
+    complete_sources,
+    folders_of,
+    gathered,
+    models_option,
+    progress_bar,
+)
+from harness.description.locate import default_models_dir
 from harness.description.model import load_model
-from harness.engines.registry import REFERENCE, registered
+from harness.engines.registry import REFERENCE
 from harness.errors import CrosscheckError, InputError
 from harness.rendering.engine_table import show_engine_table
 from harness.rendering.files import prepare, write_index, write_report, write_summary
@@ -24,21 +29,9 @@ from harness.rendering.terminal import show
 from harness.report.document import Report
 from harness.report.text import plain
 from harness.run.options import Options
-from harness.verdict.accepted import FOLDER, AcceptedNumbers, read_accepted
+from harness.verdict.accepted import AcceptedNumbers, compared, read_accepted
 from harness.verdict.crosscheck import crosscheck
-from harness.verdict.gate import combined
 from harness.workers.process import Limits
-
-
-def complete_robots(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Names of the robot models that begin like that."""
-    folders = model_folders(ctx.params.get("models") or default_models_dir())
-    return [CompletionItem(name) for name in folders if name.startswith(incomplete)]
-
-
-def complete_sources(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Names of the engines that begin like that."""
-    return [CompletionItem(name) for name in registered() if name.startswith(incomplete)]
 
 
 def _workers(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> tuple[tuple[str, tuple[str, ...]], ...]:
@@ -58,19 +51,30 @@ def _workers(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
     return tuple(pairs)
 
 
-models_option = click.option(
-    "--models",
-    type=click.Path(path_type=Path),
-    help="Folder of robot models.  [default: the models that come with the package]",
-)
+@dataclass(frozen=True, kw_only=True)
+class RunSettings:
+    """The arguments and options of `crosscheck run`; timeouts in seconds, the memory limit in GiB."""
 
-accepted_option = click.option(
-    "--accepted",
-    type=click.Path(path_type=Path),
-    default=Path("reports") / FOLDER,
-    show_default=True,
-    help="Folder of the accepted numbers.",
-)
+    robots: tuple[str, ...]
+    models: Path | None
+    sources: tuple[str, ...]
+    all_engines: bool
+    workers: tuple[tuple[str, tuple[str, ...]], ...]
+    reference: str
+    samples: int
+    certify: bool
+    explain: bool
+    seed: int
+    out: Path
+    accepted: Path
+    strict: bool
+    jobs: int
+    start_timeout: float
+    block_timeout: float
+    memory_limit: float
+    in_process: bool
+    quiet: bool
+    as_json: bool
 
 
 @click.command()
@@ -115,86 +119,60 @@ accepted_option = click.option(
 @click.option("--in-process", is_flag=True, help="Run the engines in this process, for debugging: no limits hold.")
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing but errors; the exit code tells.")
 @click.option("--json", "as_json", is_flag=True, help="Print each report as one line of JSON.")
-def run(
-    robots: tuple[str, ...],
-    models: Path | None,
-    sources: tuple[str, ...],
-    all_engines: bool,
-    workers: tuple[tuple[str, tuple[str, ...]], ...],
-    reference: str,
-    samples: int,
-    certify: bool,
-    explain: bool,
-    seed: int,
-    out: Path,
-    accepted: Path,
-    strict: bool,
-    jobs: int,
-    start_timeout: float,
-    block_timeout: float,
-    memory_limit: float,
-    in_process: bool,
-    quiet: bool,
-    as_json: bool,
-) -> int:
+@gathered(RunSettings, "settings")
+def run(settings: RunSettings) -> int:
     """Cross-check robot models (names, or folders with a model.toml; none: all) and write reports.
 
     Exit code: 0 all agree, 1 a disagreement, 2 wrong input, 3 a required source is missing or failed; with several of
     these, the smallest.
     """
-    limits = Limits(start_timeout, block_timeout, memory_limit * 2**30)
+    limits = Limits(settings.start_timeout, settings.block_timeout, settings.memory_limit * 2**30)
     options = Options(
-        samples=samples,
-        seed=seed,
-        sources=sources,
-        reference=reference,
+        samples=settings.samples,
+        seed=settings.seed,
+        sources=settings.sources,
+        reference=settings.reference,
         command="",
-        certify=certify,
-        explain=explain,
-        all_engines=all_engines,
-        workers=workers,
+        certify=settings.certify,
+        explain=settings.explain,
+        all_engines=settings.all_engines,
+        workers=settings.workers,
         limits=limits,
-        jobs=jobs,
-        in_process=in_process,
-        strict=strict,
+        jobs=settings.jobs,
+        in_process=settings.in_process,
     )
-    folders = folders_of(robots, models or default_models_dir())
-    prepare(out)
+    folders = folders_of(settings.robots, settings.models or default_models_dir())
+    prepare(settings.out)
     codes: list[int] = []
     names: dict[str, Path] = {}
     reports: list[Report] = []
-    with options.worker_pool() as pool:
+    with options.workshop() as workshop:
         for folder in folders:
             try:
                 model = load_model(folder)
                 if model.name in names:
                     raise InputError(f"robot name {model.name!r} is also that of {names[model.name]}", where=folder)
                 names[model.name] = folder
-                on_file = _on_file(accepted / f"{model.name}.json", strict)
-                with progress_bar(model.name, quiet or as_json) as advance:
-                    command = _command(folder, models, options, strict)
-                    report = crosscheck(model, options.reproduced_by(command), advance, pool, on_file)
-                write_report(report, out)
+                on_file = _on_file(settings.accepted / f"{model.name}.json", settings.strict)
+                with progress_bar(model.name, settings.quiet or settings.as_json) as advance:
+                    command = _command(folder, settings.models, options, settings.strict)
+                    report = crosscheck(model, options.reproduced_by(command), advance, workshop)
+                report = report if on_file is None else compared(report, on_file, settings.strict)
+                write_report(report, settings.out)
                 write_summary(report)
-                _tell(report, quiet, as_json)
+                _tell(report, settings.quiet, settings.as_json)
                 reports.append(report)
                 codes.append(report.verdict.exit_code)
             except CrosscheckError as error:  # this robot's input is wrong: the others are still checked
                 complain(error)
                 codes.append(error.exit_code)
-    write_index(out)
-    if not quiet and not as_json:
-        if all_engines:
+    write_index(settings.out)
+    if not settings.quiet and not settings.as_json:
+        if settings.all_engines:
             show_engine_table(reports, console())
-        console().print(f"{codes.count(0)} of {len(codes)} robots agree; reports in {plain(str(out))}", markup=False)
-    return combined(codes)
-
-
-def folders_of(robots: tuple[str, ...], models: Path) -> list[Path]:
-    """The folders of the robots asked for; all of `models`, if none."""
-    if not robots:
-        return list(model_folders(models).values())
-    return list(dict.fromkeys(find_model(robot, models) for robot in robots))
+        where = plain(str(settings.out))
+        console().print(f"{codes.count(0)} of {len(codes)} robots agree; reports in {where}", markup=False)
+    return min((code for code in codes if code), default=0)
 
 
 def _on_file(path: Path, strict: bool) -> AcceptedNumbers | None:
@@ -219,23 +197,6 @@ def _command(folder: Path, models: Path | None, options: Options, strict: bool) 
     for option, wanted in (("--no-certify", not options.certify), ("--no-explain", not options.explain), ("--strict", strict)):
         words += [option] if wanted else []
     return shlex.join(words)
-
-
-@contextlib.contextmanager
-def progress_bar(name: str, silent: bool) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on stderr for one robot; none when piped, in CI or when silent."""
-    bar = Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TextColumn("{task.completed}/{task.total}"),
-        TimeRemainingColumn(),
-        console=console(stderr=True),
-        transient=True,
-        disable=not sys.stderr.isatty() or bool(os.environ.get("CI")) or silent,
-    )
-    with bar:
-        task = bar.add_task(plain(name), total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
 def _tell(report: Report, quiet: bool, as_json: bool) -> None:

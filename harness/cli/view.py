@@ -8,12 +8,13 @@ import io
 import logging
 import threading
 import webbrowser
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
 
 from harness.cli.console import console
-from harness.cli.run import complete_robots, complete_sources, models_option
+from harness.cli.shared import complete_robots, complete_sources, gathered, models_option
 from harness.description.locate import default_models_dir, find_model
 from harness.description.model import load_model
 from harness.engines.registry import REFERENCE
@@ -24,6 +25,18 @@ from harness.view.page import Page
 from harness.view.session import Session
 
 LOOPBACK = "127.0.0.1"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViewSettings:
+    """The options of `crosscheck view`."""
+
+    sources: tuple[str, ...]
+    reference: str
+    samples: int
+    seed: int
+    port: int
+    open_page: bool
 
 
 @click.command()
@@ -39,16 +52,8 @@ LOOPBACK = "127.0.0.1"
 @click.option("--seed", type=int, default=0, show_default=True, help="Their seed.")
 @click.option("--port", type=click.IntRange(1, 65535), default=8080, show_default=True, help="Port, or the next free one.")
 @click.option("--open", "open_page", is_flag=True, help="Open the page in the browser.")
-def view(
-    robot: str,
-    models: Path | None,
-    sources: tuple[str, ...],
-    reference: str,
-    samples: int,
-    seed: int,
-    port: int,
-    open_page: bool,
-) -> int:
+@gathered(ViewSettings, "settings")
+def view(robot: str, models: Path | None, settings: ViewSettings) -> int:
     """Show a robot's sources side by side in a local page, with a slider for each joint. Ctrl-C ends it.
 
     The page is served to this machine alone. Needs viser: pip install 'fk-crosscheck[view]'.
@@ -58,12 +63,19 @@ def view(
     except ImportError as error:
         raise EngineUnavailable("view", f"import viser failed: {error}", "pip install 'fk-crosscheck[view]'") from None
     model = load_model(find_model(robot, models or default_models_dir()))
-    options = Options(samples=samples, seed=seed, sources=sources, reference=reference, certify=False, explain=False)
+    options = Options(
+        samples=settings.samples,
+        seed=settings.seed,
+        sources=settings.sources,
+        reference=settings.reference,
+        certify=False,
+        explain=False,
+    )
     logging.getLogger("websockets").setLevel(logging.ERROR)  # a browser that goes away is no error of ours
     with options.worker_pool() as workers:
         session = Session(model, options, workers)
         with contextlib.redirect_stdout(io.StringIO()):  # its banner; the address is told below
-            server = viser.ViserServer(host=LOOPBACK, port=port, label=plain(model.name), verbose=False)
+            server = viser.ViserServer(host=LOOPBACK, port=settings.port, label=plain(model.name), verbose=False)
         try:
             Page(server, session)
             url = f"http://{LOOPBACK}:{server.get_port()}"
@@ -72,7 +84,7 @@ def view(
             console().print(
                 plain(f"{model.name}, {len(session.sources)} sources: {url} (Ctrl-C ends it)"), markup=False, soft_wrap=True
             )
-            if open_page:
+            if settings.open_page:
                 webbrowser.open(url)
             with contextlib.suppress(KeyboardInterrupt):
                 threading.Event().wait()

@@ -1,4 +1,4 @@
-"""`crosscheck derive-dh`: the DH table of a serial chain in a URDF, found from its placements alone."""
+"""The DH table of a serial chain in a URDF, found from its placements alone."""
 
 from __future__ import annotations
 
@@ -57,13 +57,13 @@ def derive(urdf: Urdf, base: str, tip: str, convention: Convention, source: str)
     joints = _chain_joints(urdf, path, base, tip)
     place = _placer(urdf, [joint.name for joint in joints], base, source)
     prismatic, names = [j.type == "prismatic" for j in joints], [j.name for j in joints]
-    found = screws(lambda q: place(q, [tip])[:, 0], prismatic, np.random.default_rng(0))
-    if not found.residual < RESIDUAL:
+    chain = screws(lambda q: place(q, [tip])[:, 0], prismatic, np.random.default_rng(0))
+    if not chain.residual < RESIDUAL:
         raise UrdfError(
-            f"{source} does not place it as a serial chain does: off by {found.residual:.2g} from its own screws", where=urdf.path
+            f"{source} does not place it as a serial chain does: off by {chain.residual:.2g} from its own screws", where=urdf.path
         )
     try:
-        form = canonical(found, prismatic, convention, names)
+        form = canonical(chain, prismatic, convention, names)
     except ValueError as error:
         raise UrdfError(f"no DH table: {error}", where=urdf.path) from None
     rows = tuple(
@@ -80,7 +80,7 @@ def derive(urdf: Urdf, base: str, tip: str, convention: Convention, source: str)
         tip=tip,
         links=_links(path, base, table, place),
         free=form.free,
-        residual=found.residual,
+        residual=chain.residual,
     )
 
 

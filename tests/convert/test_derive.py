@@ -16,9 +16,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from harness import se3
-from harness.cli.derive import verify
 from harness.convert.derive import derive
-from harness.convert.write_model import export_urdf
+from harness.convert.export_urdf import export_urdf
+from harness.convert.verify import verify
 from harness.description.dh import Convention, DHRow, DHTable
 from harness.description.model import RobotModel, load_model
 from harness.description.tidy import angle_text, number_text, tidy_angle, tidy_length

@@ -1,0 +1,98 @@
+"""What several commands use: options, completion of names, the folders of robots, the progress bar, options as one record."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import functools
+import os
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import click
+from click.shell_completion import CompletionItem
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from harness.cli.console import console
+from harness.description.locate import default_models_dir, find_model, model_folders
+from harness.engines.registry import registered
+from harness.report.text import plain
+from harness.verdict.accepted import FOLDER
+
+# A smaller difference of two lengths [m] or angles [rad] is shown as none.
+CHANGED = 1e-9
+
+Command = Callable[..., int]
+
+models_option = click.option(
+    "--models",
+    type=click.Path(path_type=Path),
+    help="Folder of robot models.  [default: the models that come with the package]",
+)
+
+accepted_option = click.option(
+    "--accepted",
+    type=click.Path(path_type=Path),
+    default=Path("reports") / FOLDER,
+    show_default=True,
+    help="Folder of the accepted numbers.",
+)
+
+
+def gathered(record: type[Any], parameter: str) -> Callable[[Command], Command]:
+    """Decorator: a command gets several of its options as one record. It stands below the options, next to the function.
+
+    record: a dataclass. Each field has the name of an option or argument, and takes its value.
+    parameter: name of the function's parameter that the record is passed to.
+
+    Options that are no field are passed on as they are.
+    Raises TypeError when the command is called, if a field without a default has no option.
+    """
+    fields = [field.name for field in dataclasses.fields(record)]
+
+    def decorate(command: Command) -> Command:
+        @functools.wraps(command)
+        def with_record(*args: Any, **values: Any) -> int:
+            taken = {name: values.pop(name) for name in fields if name in values}
+            return command(*args, **values, **{parameter: record(**taken)})
+
+        return with_record
+
+    return decorate
+
+
+def complete_robots(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Names of the robot models that begin like that."""
+    folders = model_folders(ctx.params.get("models") or default_models_dir())
+    return [CompletionItem(name) for name in folders if name.startswith(incomplete)]
+
+
+def complete_sources(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Names of the engines that begin like that."""
+    return [CompletionItem(name) for name in registered() if name.startswith(incomplete)]
+
+
+def folders_of(robots: tuple[str, ...], models: Path) -> list[Path]:
+    """The folders of the robots asked for; all of `models`, if none."""
+    if not robots:
+        return list(model_folders(models).values())
+    return list(dict.fromkeys(find_model(robot, models) for robot in robots))
+
+
+@contextlib.contextmanager
+def progress_bar(name: str, silent: bool) -> Iterator[Callable[[int, int], None]]:
+    """A progress bar on stderr for one robot; none when piped, in CI or when silent."""
+    bar = Progress(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TextColumn("{task.completed}/{task.total}"),
+        TimeRemainingColumn(),
+        console=console(stderr=True),
+        transient=True,
+        disable=not sys.stderr.isatty() or bool(os.environ.get("CI")) or silent,
+    )
+    with bar:
+        task = bar.add_task(plain(name), total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
