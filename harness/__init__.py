@@ -1,3 +1,88 @@
-"""fk-crosscheck: cross-validation of a robot's DH table against its URDF, with every forward-kinematics engine people use."""
+"""fk-crosscheck: cross-validation of a robot's DH table against its URDF, with every forward-kinematics engine people use.
+
+The names below are the Python API (docs/api.md). Each is imported when it is first asked for: a worker imports this package
+in an environment that has NumPy and one engine, and `crosscheck --help` needs none of it.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from harness.api import (
+        Session,
+        crosscheck,
+        derive_dh,
+        diff,
+        forward_kinematics,
+        identify,
+        load_model,
+        read_report,
+        write_report,
+    )
+    from harness.convert.derive import Derived
+    from harness.description.dh import DHRow, DHTable
+    from harness.description.model import RobotModel
+    from harness.difference.identify import Identification
+    from harness.difference.result import Difference
+    from harness.errors import CrosscheckError, EngineFailed, EngineUnavailable, InputError
+    from harness.report.document import Report
+    from harness.run.options import Options
+    from harness.workers.process import Limits
+
+_HOME = {
+    **dict.fromkeys(
+        ("Session", "crosscheck", "derive_dh", "diff", "forward_kinematics", "identify", "load_model", "read_report",
+         "write_report"),
+        "harness.api",
+    ),
+    "Derived": "harness.convert.derive",
+    **dict.fromkeys(("DHRow", "DHTable"), "harness.description.dh"),
+    "RobotModel": "harness.description.model",
+    "Identification": "harness.difference.identify",
+    "Difference": "harness.difference.result",
+    **dict.fromkeys(("CrosscheckError", "EngineFailed", "EngineUnavailable", "InputError"), "harness.errors"),
+    "Report": "harness.report.document",
+    "Options": "harness.run.options",
+    "Limits": "harness.workers.process",
+}  # fmt: skip
+
+__all__ = [
+    "CrosscheckError",
+    "DHRow",
+    "DHTable",
+    "Derived",
+    "Difference",
+    "EngineFailed",
+    "EngineUnavailable",
+    "Identification",
+    "InputError",
+    "Limits",
+    "Options",
+    "Report",
+    "RobotModel",
+    "Session",
+    "crosscheck",
+    "derive_dh",
+    "diff",
+    "forward_kinematics",
+    "identify",
+    "load_model",
+    "read_report",
+    "write_report",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -19,15 +19,16 @@ GROUND = {"se3", "errors"}
 
 FLOORS: dict[str, set[str]] = {
     "cli": {
-        "mutation", "view", "convert", "difference", "verdict", "run", "workers", "cause", "kinematics", "engines",
-        "rendering", "report", "description",
+        "api", "mutation", "view", "convert", "difference", "verdict", "run", "workers", "engines", "rendering", "report",
+        "description",
     },
+    "api": {"convert", "difference", "verdict", "run", "engines", "rendering", "report", "description"},
     "mutation": {"verdict", "run", "workers", "cause", "kinematics", "engines", "rendering", "report", "description"},
-    "view": {"verdict", "run", "workers", "kinematics", "rendering", "report", "description"},
+    "view": {"run", "workers", "kinematics", "rendering", "report", "description"},
     "convert": {"verdict", "run", "kinematics", "engines", "report", "description"},
     "verdict": {"run", "workers", "cause", "kinematics", "comparison", "engines", "report", "description"},
     "run": {"workers", "cause", "certificate", "kinematics", "comparison", "engines", "description"},
-    "difference": {"workers", "cause", "certificate", "kinematics", "description"},
+    "difference": {"workers", "cause", "certificate", "kinematics", "report", "description"},
     "workers": {"engines", "description"},
     "cause": {"kinematics", "description"},
     "certificate": {"description"},
@@ -39,7 +40,7 @@ FLOORS: dict[str, set[str]] = {
     "description": set(),
 }  # fmt: skip
 
-LONGEST_MODULE = 300
+LONGEST_MODULE, LONGEST_FUNCTION, MOST_PARAMETERS = 300, 60, 8
 
 MODULES = sorted(p for p in ROOT.rglob("*.py") if "_data" not in p.parts)
 
@@ -63,19 +64,26 @@ def imports(path: Path) -> set[str]:
     return {name for name in found if (ROOT / room_of(name)).is_dir() or (ROOT / f"{room_of(name)}.py").is_file()}
 
 
+def files_of(room: str) -> list[Path]:
+    """The modules of a folder, or the one of that name."""
+    return sorted((ROOT / room).rglob("*.py")) or [ROOT / f"{room}.py"]
+
+
 def is_lazy(path: Path) -> bool:
     """The package itself and its start: what they hand on is imported when it is asked for."""
     return path.parent == ROOT and path.name in ("__init__.py", "__main__.py")
 
 
 def test_every_folder_has_a_floor() -> None:
-    assert {p.parent.name for p in ROOT.glob("*/*.py")} == set(FLOORS)
+    folders = {p.parent.name for p in ROOT.glob("*/*.py")}
+    modules = {p.stem for p in ROOT.glob("*.py") if not p.name.startswith("__")}
+    assert folders | modules == {*FLOORS, *GROUND}
 
 
 @pytest.mark.parametrize("room", FLOORS)
 def test_arrows_run_one_way(room: str) -> None:
     allowed = {room, *FLOORS[room], *GROUND}
-    for path in (ROOT / room).rglob("*.py"):
+    for path in files_of(room):
         for name in imports(path):
             assert room_of(name) in allowed, f"{room}/{path.name} imports {name}: {room} may import {sorted(allowed)}"
 
@@ -167,3 +175,34 @@ def positional_records(path: Path) -> list[str]:
 
 def test_records_of_many_fields_are_built_by_name() -> None:
     assert {p.name: found for p in MODULES if (found := positional_records(p))} == {}
+
+
+def test_no_floor_is_allowed_and_not_used() -> None:
+    used = {room: {room_of(n) for p in files_of(room) for n in imports(p)} for room in FLOORS}
+    assert {room: sorted(FLOORS[room] - used[room]) for room in FLOORS if FLOORS[room] - used[room]} == {}
+
+
+def functions(path: Path) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
+    return [n for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
+
+
+def test_functions_fit_a_screen() -> None:
+    def length(f: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+        return (f.end_lineno or f.lineno) - f.lineno + 1
+
+    long = {f"{p.name}:{f.name}": length(f) for p in MODULES for f in functions(p) if length(f) > LONGEST_FUNCTION}
+    assert not long
+
+
+def test_functions_take_few_parameters() -> None:
+    def count(f: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+        names = [a.arg for a in (*f.args.posonlyargs, *f.args.args, *f.args.kwonlyargs)]
+        return len([n for n in names if n not in ("self", "cls")])
+
+    many = {f"{p.name}:{f.name}": count(f) for p in MODULES for f in functions(p) if count(f) > MOST_PARAMETERS}
+    assert not many
+
+
+def test_documents_are_built_by_their_constructor() -> None:
+    """`model_copy(update=...)` validates nothing: a misspelt field passes."""
+    assert [p.name for p in MODULES if "model_copy" in p.read_text()] == []

@@ -15,7 +15,7 @@ from pydantic import BaseModel
 from harness.cli.main import cli
 from harness.description.configurations import ConfigurationsFile
 from harness.description.frames_file import FramesFile
-from harness.description.model import ModelFile
+from harness.description.model_file import ModelFile
 from harness.engines.registry import registered
 
 ROOT = Path(__file__).parent.parent

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
 import click
+from rich.console import Console
 from rich.text import Text
 
-from harness.cause.changes import amount
+from harness.api import diff
 from harness.cli.console import console
-from harness.cli.shared import CHANGED, complete_robots, gathered, models_option
+from harness.cli.shared import complete_robots, gathered, models_option
 from harness.description.dh import Convention
-from harness.description.locate import default_models_dir
-from harness.difference.differences import Diff, diff, remarks
-from harness.difference.operands import read_operand
+from harness.difference.result import Difference, Line
 from harness.errors import InputError
-from harness.kinematics.side_by_side import COLUMNS, Unit, less, turned
 from harness.rendering.tables import bare_table
-from harness.report.text import metres, plain, radians
+
+# How each kind of line and cell looks.
+STYLES = {
+    "": "", "same": "bold green", "different": "bold red", "cause": "bold", "warning": "yellow", "changed": "bold",
+    "by": "red",
+}  # fmt: skip
 
 HELP = "Link to start from, of the URDF; given twice: of A, then of B.  [default: the root]"
 
@@ -53,16 +55,17 @@ def diff_command(a: str, b: str, models: Path | None, settings: DiffSettings) ->
     A and B are any two of: a robot model, a DH CSV, a URDF file, PACKAGE:FILE.urdf of an installed package,
     roboticstoolbox:NAME. Exit code: 0 the same, 1 different, 2 wrong input.
     """
-    bases, tips = _each(settings.bases, "--base"), _each(settings.tips, "--tip")
-    ends = list(zip(bases, tips, _each(settings.conventions, "--convention"), strict=True))
-    folder = models or default_models_dir()
-    operands = [
-        read_operand(text, folder, base, tip, cast(Convention, convention or "standard"))
-        for text, (base, tip, convention) in zip((a, b), ends, strict=True)
-    ]
-    result = diff(operands[0], operands[1], (settings.tolerance, settings.tolerance))
+    result = diff(
+        a,
+        b,
+        base=_each(settings.bases, "--base"),
+        tip=_each(settings.tips, "--tip"),
+        convention=cast("tuple[Convention, Convention]", _each(settings.conventions or ("standard",), "--convention")),
+        tolerance=settings.tolerance,
+        models=models,
+    )
     _show(result)
-    return 0 if result.same else 1
+    return result.exit_code
 
 
 def _each(values: tuple[str, ...], option: str) -> tuple[str | None, str | None]:
@@ -72,65 +75,30 @@ def _each(values: tuple[str, ...], option: str) -> tuple[str | None, str | None]
     return (values[0], values[-1]) if values else (None, None)
 
 
-def _show(result: Diff) -> None:
+def _show(result: Difference) -> None:
+    """Print verdict and causes, then both canonical tables, a row a joint."""
     out = console()
-    position, rotation = result.errors
-    word = Text("SAME", style="bold green") if result.same else Text("DIFFERENT", style="bold red")
-    seen = f"up to {metres(position)}, {radians(rotation)} apart"
-    proven = f"; for all q at most {metres(result.bound[0])}, {radians(result.bound[1])}" if result.bound else ""
-    out.print(word, Text(plain(f"{result.a.label} and {result.b.label}: {seen}{proven}")), soft_wrap=True)
-    if result.unexplained:
-        out.print(Text(plain(f"  unexplained: {result.unexplained}")), soft_wrap=True)
-    if result.explanation is not None:
-        e = result.explanation
-        for i, (change, others) in enumerate(zip(e.changes, e.equivalents, strict=True)):
-            out.print(Text(plain(f"  {'why: ' if i == 0 else '     '}{change.text}"), style="bold"), soft_wrap=True)
-            if others:
-                out.print(Text(plain(f"         the same: {'; '.join(c.text for c in others[:4])}")), soft_wrap=True)
-        for text in remarks(result):
-            out.print(Text(plain(f"  note: {text}")), soft_wrap=True)
-        after = f"{metres(e.after[0])}, {radians(e.after[1])} after"
-        out.print(Text(f"  tried: {metres(e.before[0])}, {radians(e.before[1])} before, {after}"))
+    for line in (result.headline(), *result.reasons()):
+        _print(out, line)
     out.print()
-    _tables(result)
-
-
-def _tables(result: Diff) -> None:
-    """Both canonical tables, a row a joint, and what differs in mm and degrees."""
-    out = console()
-    one, other = result.tables
-    for operand, side in ((result.a, one), (result.b, other)):
-        if side.problem:
-            out.print(Text(plain(f"{operand.label} has no DH table: {side.problem}"), style="yellow"), soft_wrap=True)
-    if one.problem or other.problem:
+    for line in result.notes():
+        _print(out, line)
+    header, rows = result.table()
+    if not rows:
         return
-    out.print(
-        Text(plain(f"canonical {result.convention} DH: A = {result.a.label}, B = {result.b.label}; differences B - A")),
-        soft_wrap=True,
-    )
-    table = bare_table("joint")
-    for name, unit in COLUMNS:
-        for head in (f"A {name} [{'mm' if unit == 'm' else 'deg'}]", f"B {name}", "difference"):
-            table.add_column(head, justify="right")
-    for a, b in zip(one.rows, turned(one.rows, other.rows, result.convention), strict=True):
-        cells: list[Text] = [Text(plain(a.name))]
-        for name, unit in COLUMNS:
-            cells += _cells(float(getattr(a, name)), float(getattr(b, name)), unit)
-        table.add_row(*cells)
+    table = bare_table(header[0])
+    for column in header[1:]:
+        table.add_column(column, justify="right")
+    for row in rows:
+        table.add_row(*(Text(cell.text, style=STYLES[cell.kind]) for cell in row))
     out.print(table)
-    if result.matching is not None and (largest := result.matching.largest) is not None and largest.size > CHANGED:
-        what = f"{largest.name} of {largest.joint} by {amount(largest.size, cast(Unit, largest.unit)).lstrip('+')}"
-        out.print(Text(plain(f"base, tool, joint signs and zero offsets aside, most different: {what}")), soft_wrap=True)
-    elif result.matching is not None:
-        out.print(Text("base, tool, joint signs and zero offsets aside: the same mechanism"))
+    out.print(Text(result.aside()), soft_wrap=True)
 
 
-def _cells(a: float, b: float, unit: Unit) -> list[Text]:
-    scale = 1e3 if unit == "m" else 180.0 / math.pi
-    difference = less(b, a, unit)
-    changed = abs(difference) > CHANGED
-    return [
-        Text(f"{round(a * scale, 6) + 0.0:.9g}"),
-        Text(f"{round(b * scale, 6) + 0.0:.9g}", style="bold" if changed else ""),
-        Text(f"{difference * scale:+.6g}" if changed else "", style="red"),
-    ]
+def _print(out: Console, line: Line) -> None:
+    """One line, its first word in the colour of the verdict."""
+    word, _, rest = line.text.partition(" ")
+    if line.kind in ("same", "different"):
+        out.print(Text(word, style=STYLES[line.kind]), Text(rest), soft_wrap=True)
+    else:
+        out.print(Text(line.text, style=STYLES[line.kind]), soft_wrap=True)

@@ -8,19 +8,13 @@ from typing import cast
 import click
 from rich.text import Text
 
-from harness.cause.changes import amount
+from harness.api import identify
 from harness.cli.console import console
-from harness.cli.shared import CHANGED, complete_robots, models_option
+from harness.cli.shared import complete_robots, models_option
 from harness.description.dh import Convention
-from harness.description.locate import default_models_dir
-from harness.difference.identify import identify
-from harness.difference.operands import read_operand
-from harness.kinematics.invariants import Difference
-from harness.kinematics.side_by_side import Unit
+from harness.difference.identify import NONE_LIKE_IT
 from harness.rendering.tables import bare_table
 from harness.report.text import plain
-
-ALIKE = 1e-3
 
 
 @click.command("identify")
@@ -38,30 +32,17 @@ def identify_command(robot: str, models: Path | None, base: str | None, tip: str
     Known are the robot models, the tables beside them, and those that the Robotics Toolbox packages, if it is installed.
     Exit code: 0 one is it to within a millimetre and a milliradian, 1 none is, 2 wrong input.
     """
-    folder = models or default_models_dir()
-    operand = read_operand(robot, folder, base, tip, cast(Convention, convention))
-    matches, left_out = identify(operand, folder)
+    result = identify(robot, base=base, tip=tip, convention=cast(Convention, convention), models=models)
     out = console()
-    kinds = "".join("P" if slides else "R" for slides in operand.prismatic)
-    out.print(
-        Text(plain(f"{operand.label}: {len(kinds)} joints, {kinds}; base, tool, joint signs and zero offsets aside")),
-        soft_wrap=True,
-    )
-    table = bare_table("known table", "largest length difference", "largest angle difference", "joints that turn the other way")
-    for one in matches[:most]:
-        flipped = ", ".join(name for name, sign in zip(operand.joints, one.signs, strict=True) if sign < 0)
-        table.add_row(*(Text(plain(cell)) for cell in (one.name, _largest(one.length), _largest(one.angle), flipped)))
-    if matches:
+    out.print(Text(result.headline()), soft_wrap=True)
+    header, rows = result.table(most)
+    if rows:
+        table = bare_table(*header)
+        for row in rows:
+            table.add_row(*(Text(cell) for cell in row))
         out.print(table)
     else:
-        out.print(Text("no known table has such joints"))
-    for text in left_out:
+        out.print(Text(NONE_LIKE_IT))
+    for text in result.left_out:
         out.print(Text(plain(f"left out: {text}"), style="yellow"), soft_wrap=True)
-    return 0 if matches and matches[0].size[0] <= ALIKE else 1
-
-
-def _largest(difference: Difference | None) -> str:
-    if difference is None or difference.size <= CHANGED:
-        return "0"
-    size = amount(difference.size, cast(Unit, difference.unit)).lstrip("+")
-    return f"{size} ({difference.name} of {difference.joint})"
+    return result.exit_code

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from harness.api import Session
 from harness.cli.console import console
 from harness.cli.error_line import complain
 from harness.cli.shared import (
@@ -29,8 +30,7 @@ from harness.rendering.terminal import show
 from harness.report.document import Report
 from harness.report.text import plain
 from harness.run.options import Options
-from harness.verdict.accepted import AcceptedNumbers, compared, read_accepted
-from harness.verdict.crosscheck import crosscheck
+from harness.verdict.gate import combined
 from harness.workers.process import Limits
 
 
@@ -75,6 +75,29 @@ class RunSettings:
     in_process: bool
     quiet: bool
     as_json: bool
+
+    @property
+    def silent(self) -> bool:
+        """Whether people read nothing of it: no progress, no tables."""
+        return self.quiet or self.as_json
+
+    def options(self) -> Options:
+        """What every robot is cross-checked with. Raises InputError for numbers that cannot be."""
+        return Options(
+            samples=self.samples,
+            seed=self.seed,
+            sources=self.sources,
+            reference=self.reference,
+            certify=self.certify,
+            explain=self.explain,
+            all_engines=self.all_engines,
+            workers=self.workers,
+            limits=Limits(self.start_timeout, self.block_timeout, self.memory_limit * 2**30),
+            jobs=self.jobs,
+            in_process=self.in_process,
+            accepted=self.accepted,
+            strict=self.strict,
+        )
 
 
 @click.command()
@@ -126,61 +149,45 @@ def run(settings: RunSettings) -> int:
     Exit code: 0 all agree, 1 a disagreement, 2 wrong input, 3 a required source is missing or failed; with several of
     these, the smallest.
     """
-    limits = Limits(settings.start_timeout, settings.block_timeout, settings.memory_limit * 2**30)
-    options = Options(
-        samples=settings.samples,
-        seed=settings.seed,
-        sources=settings.sources,
-        reference=settings.reference,
-        command="",
-        certify=settings.certify,
-        explain=settings.explain,
-        all_engines=settings.all_engines,
-        workers=settings.workers,
-        limits=limits,
-        jobs=settings.jobs,
-        in_process=settings.in_process,
-    )
+    options = settings.options()
     folders = folders_of(settings.robots, settings.models or default_models_dir())
     prepare(settings.out)
     codes: list[int] = []
     names: dict[str, Path] = {}
     reports: list[Report] = []
-    with options.workshop() as workshop:
+    with Session(options) as session:
         for folder in folders:
             try:
-                model = load_model(folder)
-                if model.name in names:
-                    raise InputError(f"robot name {model.name!r} is also that of {names[model.name]}", where=folder)
-                names[model.name] = folder
-                on_file = _on_file(settings.accepted / f"{model.name}.json", settings.strict)
-                with progress_bar(model.name, settings.quiet or settings.as_json) as advance:
-                    command = _command(folder, settings.models, options, settings.strict)
-                    report = crosscheck(model, options.reproduced_by(command), advance, workshop)
-                report = report if on_file is None else compared(report, on_file, settings.strict)
-                write_report(report, settings.out)
-                write_summary(report)
-                _tell(report, settings.quiet, settings.as_json)
-                reports.append(report)
-                codes.append(report.verdict.exit_code)
+                reports.append(_checked(session, folder, names, settings))
+                codes.append(reports[-1].verdict.exit_code)
             except CrosscheckError as error:  # this robot's input is wrong: the others are still checked
                 complain(error)
                 codes.append(error.exit_code)
     write_index(settings.out)
-    if not settings.quiet and not settings.as_json:
+    if not settings.silent:
         if settings.all_engines:
             show_engine_table(reports, console())
         where = plain(str(settings.out))
         console().print(f"{codes.count(0)} of {len(codes)} robots agree; reports in {where}", markup=False)
-    return min((code for code in codes if code), default=0)
+    return combined(codes)
 
 
-def _on_file(path: Path, strict: bool) -> AcceptedNumbers | None:
-    """The accepted numbers, before any work is done. Raises InputError if they are wrong, or not there and `strict`."""
-    return read_accepted(path) if strict or path.exists() else None
+def _checked(session: Session, folder: Path, names: dict[str, Path], settings: RunSettings) -> Report:
+    """Cross-check one robot, write its reports and print its verdict. `names` collects the folder of each robot name."""
+    model = load_model(folder)
+    if model.name in names:
+        raise InputError(f"robot name {model.name!r} is also that of {names[model.name]}", where=folder)
+    names[model.name] = folder
+    command = _command(folder, settings.models, session.options)
+    with progress_bar(model.name, settings.silent) as advance:
+        report = session.crosscheck(model, progress=advance, options=session.options.reproduced_by(command))
+    write_report(report, settings.out)
+    write_summary(report)
+    _print(report, settings)
+    return report
 
 
-def _command(folder: Path, models: Path | None, options: Options, strict: bool) -> str:
+def _command(folder: Path, models: Path | None, options: Options) -> str:
     """The command line that gives the same numbers, and the same verdict."""
     inside = folder.parent == (models or default_models_dir())
     words = ["crosscheck", "run", folder.name if inside else str(folder)]
@@ -194,15 +201,15 @@ def _command(folder: Path, models: Path | None, options: Options, strict: bool) 
     if options.reference != REFERENCE:
         words += ["--reference", options.reference]
     words += ["--samples", str(options.samples), "--seed", str(options.seed)]
-    for option, wanted in (("--no-certify", not options.certify), ("--no-explain", not options.explain), ("--strict", strict)):
-        words += [option] if wanted else []
+    flags = {"--no-certify": not options.certify, "--no-explain": not options.explain, "--strict": options.strict}
+    words += [flag for flag, wanted in flags.items() if wanted]
     return shlex.join(words)
 
 
-def _tell(report: Report, quiet: bool, as_json: bool) -> None:
-    if as_json:
+def _print(report: Report, settings: RunSettings) -> None:
+    if settings.as_json:
         click.echo(report.model_dump_json())
-    elif not quiet:
+    elif not settings.quiet:
         out = console()
         show(report, out)
         out.print()

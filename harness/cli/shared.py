@@ -21,9 +21,6 @@ from harness.engines.registry import registered
 from harness.report.text import plain
 from harness.verdict.accepted import FOLDER
 
-# A smaller difference of two lengths [m] or angles [rad] is shown as none.
-CHANGED = 1e-9
-
 Command = Callable[..., int]
 
 models_option = click.option(

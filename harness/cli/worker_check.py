@@ -18,7 +18,8 @@ from harness.description.model import RobotModel, load_model
 from harness.engines.registry import description_of
 from harness.errors import EngineFailed, EngineUnavailable
 from harness.report.text import plain
-from harness.run.binding import bind, wanted_frames
+from harness.run.binding import bind
+from harness.run.naming import wanted_frames
 from harness.workers import protocol
 from harness.workers.conformance import Finding, examine
 from harness.workers.pool import Workers

@@ -34,7 +34,12 @@ def read_dh_csv(path: Path) -> tuple[tuple[DHRow, ...], tuple[SuspectNumber, ...
     Header `joint,type,a,alpha,d,theta` or, as articles have it, `name,a,alpha,d,theta_offset`; `#` starts a comment;
     without a `type` column every row is revolute; an empty cell is zero. Raises ModelFileError with file and line.
     """
-    table = csv.reader(io.StringIO(_without_comments(read_text(path))), skipinitialspace=True)
+    return parse_dh_csv(read_text(path), path)
+
+
+def parse_dh_csv(text: str, path: Path) -> tuple[tuple[DHRow, ...], tuple[SuspectNumber, ...]]:
+    """The same from text; `path` is for messages. Raises ModelFileError with file and line."""
+    table = csv.reader(io.StringIO(_without_comments(text)), skipinitialspace=True)
     header: list[str] | None = None
     rows: list[DHRow] = []
     suspects: list[SuspectNumber] = []

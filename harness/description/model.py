@@ -4,152 +4,24 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
 
 from harness.description.configurations import ConfigurationSet, ConfigurationsFile, resolve_configurations
-from harness.description.dh import Convention, DHTable
+from harness.description.dh import DHTable
 from harness.description.dh_csv import SuspectNumber, read_dh_csv
 from harness.description.engine_names import check_engine_names
 from harness.description.frames import FrameMap, resolve_frames
 from harness.description.frames_file import EngineNames, FramesFile
 from harness.description.joints import JointMap, identity_map, mapped_chain, random_limits, resolve_joints
 from harness.description.locate import locate_urdf
+from harness.description.model_file import ModelFile
 from harness.description.toml_file import read_toml
 from harness.description.urdf import Urdf
 from harness.description.urdf_file import read_urdf
 from harness.description.urdf_lint import Finding, check
-from harness.description.values import Number, Strict, Transform
 from harness.errors import MappingError, ModelFileError, nearest
-
-SourceName = str
-RESERVED = ("index", "report.schema")
-
-
-class Provenance(Strict):
-    """Where the numbers of dh.csv come from: document, page, date of the document, and a note."""
-
-    document: str = Field(min_length=1)
-    page: str = ""
-    date: str = ""
-    note: str = ""
-
-
-class Tolerance(Strict):
-    """Largest discrepancy that counts as agreement.
-
-    Attributes:
-        position: distance of origins [m].
-        rotation: angle between orientations [rad].
-    """
-
-    position: Number = Field(gt=0)
-    rotation: Number = Field(gt=0)
-
-
-class SourceEntry(Strict):
-    """One `[[source]]`. Any source that runs must agree.
-
-    Attributes:
-        name: source name, such as `urdf:pinocchio`, or a name of the user's for a command.
-        required: whether it must run.
-        tolerance: its own tolerance, if it is not the model's.
-        command: a program of the user's that speaks the worker protocol, run in the model's folder. `{model}` in it is that
-            folder. It is given the URDF if the name begins with `urdf:`, else the DH table.
-    """
-
-    name: SourceName = Field(pattern=r"^[A-Za-z][^\s\"]*$")
-    required: bool = True
-    tolerance: Tolerance | None = None
-    command: list[str] | None = Field(default=None, min_length=1)
-
-    @model_validator(mode="after")
-    def _an_engine_or_a_command(self) -> SourceEntry:
-        if self.command is None and ":" not in self.name:
-            raise ValueError(f"expected the name of an engine such as dh:pinocchio, or a command, got {self.name!r} alone")
-        return self
-
-
-class AcceptedEntry(Strict):
-    """One `[[accepted]]` deviation: the largest discrepancy of each of its sources at each of its frames.
-
-    Attributes:
-        source: one or more sources. A pattern such as `urdf:*` is allowed: what is wrong in the URDF is wrong in every engine.
-        frame: one or more mapped frames.
-        position: largest discrepancy [m]; 0 means that the position must be within tolerance.
-        rotation: largest discrepancy [rad]; 0 means that the rotation must be within tolerance.
-        within: how far `position` and `rotation` may be off, as a part of themselves.
-        cause: the numbers that explain it: joint, then parameter, then the change that repairs it [m or rad]. An explanation
-            by anything else, or by more, means that the deviation has changed.
-        reason: why it is accepted.
-    """
-
-    source: SourceName | list[SourceName]
-    frame: str | list[str]
-    position: Number = Field(default=0.0, ge=0)
-    rotation: Number = Field(default=0.0, ge=0)
-    within: Number = Field(default=0.02, gt=0, lt=1)
-    cause: dict[str, dict[str, Number]] = {}
-    reason: str = Field(min_length=1)
-
-    @model_validator(mode="after")
-    def _deviates(self) -> AcceptedEntry:
-        if self.position == 0.0 and self.rotation == 0.0:
-            raise ValueError("expected the size of the deviation: position, rotation or both")
-        return self
-
-    @property
-    def sources(self) -> list[str]:
-        """The sources as a list."""
-        return [self.source] if isinstance(self.source, str) else self.source
-
-    def covers(self, source: str) -> bool:
-        """Whether this entry is about the source."""
-        return any(fnmatchcase(source, pattern) for pattern in self.sources)
-
-    @property
-    def frames(self) -> list[str]:
-        """The frames as a list."""
-        return [self.frame] if isinstance(self.frame, str) else self.frame
-
-
-class UrdfEntry(Strict):
-    """`[urdf]`: where the URDF is.
-
-    Attributes:
-        file: a file under urdf/, or inside `package`.
-        package: an installed distribution; None for a file under urdf/.
-    """
-
-    file: str = Field(min_length=1)
-    package: str | None = None
-
-
-class ModelFile(Strict):
-    """model.toml."""
-
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")
-    description: str = Field(min_length=1)
-    convention: Convention
-    provenance: Provenance
-    tolerance: Tolerance
-    gate: Literal["sampled", "certified"] = "sampled"
-    base: Transform | None = None
-    tool: Transform | None = None
-    urdf: UrdfEntry | None = None
-    source: list[SourceEntry] = Field(min_length=1)
-    accepted: list[AcceptedEntry] = []
-
-    @field_validator("name")
-    @classmethod
-    def _not_reserved(cls, name: str) -> str:
-        if name.lower() in RESERVED:
-            raise ValueError(f"expected a name other than {', '.join(RESERVED)}: those files are taken in the reports' folder")
-        return name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,6 +83,24 @@ class RobotModel:
         return labels, [link for link in links if link not in mapped_links]
 
 
+def load_table(folder: Path) -> tuple[ModelFile, DHTable, tuple[SuspectNumber, ...]]:
+    """model.toml, the DH table, and the numbers in it that look cut short. No URDF is read, so no data package is needed.
+
+    Raises ModelFileError.
+    """
+    file = read_toml(folder / "model.toml", ModelFile)
+    rows, suspects = read_dh_csv(folder / "dh.csv")
+    table = DHTable(
+        rows,
+        file.convention,
+        file.base.matrix() if file.base else np.eye(4),
+        file.tool.matrix() if file.tool else np.eye(4),
+    )
+    if not table.joints:
+        raise ModelFileError("expected at least one joint that moves, every row is fixed", where=folder / "dh.csv")
+    return file, table, suspects
+
+
 def load_model(folder: Path) -> RobotModel:
     """Read and validate one robot model folder.
 
@@ -223,16 +113,7 @@ def load_model(folder: Path) -> RobotModel:
     if not folder.is_dir():
         raise ModelFileError("no such robot model folder", where=folder)
     paths = {name: folder / name for name in ("dh.csv", "model.toml", "frames.toml", "configurations.toml")}
-    file = read_toml(paths["model.toml"], ModelFile)
-    rows, suspects = read_dh_csv(paths["dh.csv"])
-    table = DHTable(
-        rows,
-        file.convention,
-        file.base.matrix() if file.base else np.eye(4),
-        file.tool.matrix() if file.tool else np.eye(4),
-    )
-    if not table.joints:
-        raise ModelFileError("expected at least one joint that moves, every row is fixed", where=paths["dh.csv"])
+    file, table, suspects = load_table(folder)
     urdf: Urdf | None = None
     findings: tuple[Finding, ...] = ()
     urdf_path: Path | None = None

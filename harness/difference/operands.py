@@ -1,27 +1,20 @@
-"""What `crosscheck diff` and `identify` are given: a robot model, a DH CSV, a URDF file, or one in an installed package."""
+"""One mechanism from a base to a tip, as `diff` and `identify` compare it: a DH table, or a chain of a URDF."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from harness.description.dh import Convention, DHTable
-from harness.description.dh_csv import read_dh_csv
+from harness.description.dh import DHTable
 from harness.description.joints import complete, leader_of
-from harness.description.locate import find_model, packaged_file
-from harness.description.model import load_model
 from harness.description.urdf import MOVABLE, UNSUPPORTED, Urdf
-from harness.description.urdf_file import read_urdf
 from harness.description.urdf_lint import check
 from harness.errors import InputError, UrdfError
 from harness.kinematics.recipes import Recipe, TableRecipe, UrdfRecipe
-from harness.workers.packaged_tables import packaged_table
 
 TIP = "tip"
-TOOLBOX = "roboticstoolbox:"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,27 +55,8 @@ class Operand:
         )
 
 
-def read_operand(text: str, models: Path, base: str | None, tip: str | None, convention: Convention) -> Operand:
-    """A robot model's name or folder, `roboticstoolbox:NAME`, FILE.csv, FILE.urdf, or PACKAGE:FILE.urdf.
-
-    Raises InputError and its kind for what cannot be read.
-    """
-    if text.startswith(TOOLBOX):
-        return _of_table(packaged_table(text.removeprefix(TOOLBOX)), text)
-    package, colon, file = text.partition(":")
-    if colon and not Path(text).exists():
-        return _of_urdf(packaged_file(package, file), base, tip)
-    path = Path(text)
-    if path.suffix.lower() == ".csv":
-        rows, _ = read_dh_csv(path)
-        return _of_table(DHTable(rows, convention), path.stem)
-    if path.is_file() or path.suffix.lower() in (".urdf", ".xml", ".xacro"):
-        return _of_urdf(path, base, tip)
-    model = load_model(find_model(text, models))
-    return _of_table(model.table, model.name)
-
-
-def _of_table(table: DHTable, name: str) -> Operand:
+def of_table(table: DHTable, name: str) -> Operand:
+    """The whole table as an operand. Raises InputError if nothing moves."""
     if not table.joints:
         raise InputError("expected at least one joint that moves, every row is fixed", where=name)
     return Operand(
@@ -90,9 +64,10 @@ def _of_table(table: DHTable, name: str) -> Operand:
     )
 
 
-def _of_urdf(path: Path, base: str | None, tip: str | None) -> Operand:
-    urdf = read_urdf(path)
+def of_urdf(urdf: Urdf, base: str | None = None, tip: str | None = None) -> Operand:
+    """The chain from link `base` (default: the root) to link `tip` (default: the only leaf). Raises InputError, UrdfError."""
     check(urdf)
+    path = urdf.path
     base, tip = base or urdf.roots[0], tip or only_leaf(urdf)
     for option, link in (("--base", base), ("--tip", tip)):
         urdf.require_link(link, option)
@@ -127,3 +102,15 @@ def matched(a: Operand, b: Operand) -> dict[str, str]:
             slides, turns = (a.label, b.label) if kinds[0][joint] else (b.label, a.label)
             raise InputError(f"joint {joint!r} slides in {slides}, and turns in {turns}")
     return names
+
+
+def named_after(nameless: Operand, other: Operand) -> Operand:
+    """A table whose rows have no names of their own, with its joints called as the other operand calls them.
+
+    It stays as it is if the counts differ.
+    """
+    table = nameless.table
+    if table is None or len(table.joints) != len(table.rows) or len(table.joints) != len(other.joints):
+        return nameless
+    rows = tuple(replace(row, name=name) for row, name in zip(table.rows, other.joints, strict=True))
+    return of_table(replace(table, rows=rows), nameless.name)

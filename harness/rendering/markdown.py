@@ -27,7 +27,7 @@ def render_markdown(report: Report) -> str:
         f"{_md(report.robot.description)}. Reference {_code(report.settings.reference)}; {report.settings.fixed} fixed and "
         f"{report.settings.samples} random configurations, seed {report.settings.seed}.",
         "",
-        "| source | verdict | worst frame | position | rotation | for all q | tolerance | size of |",
+        "| source | verdict | worst frame | position | rotation | for all q | tolerance | magnitude |",
         "|---|---|---|---|---|---|---|---|",
         *(_row(source) for source in ranked[:SOURCES]),
         *([f"| and {len(ranked) - SOURCES} more in the HTML report | | | | | | | |"] if len(ranked) > SOURCES else []),

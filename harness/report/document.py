@@ -9,10 +9,12 @@ from typing import Literal
 
 from harness.report.explanation import Explanation
 from harness.report.model_parts import SideBySide, Trees
+from harness.report.notebook import html_lines, html_table, text_table
 from harness.report.parts import Finite, Matrix, NonNegative, Part
 from harness.report.pose import Pose
 from harness.report.regression import Regression
 from harness.report.source_parts import Certificate, FrameResult, Reproducer, Tolerance, TraitNote, Validity
+from harness.report.text import metres, plain, radians
 from harness.report.verdicts import SourceVerdict
 
 WORDS = {0: "PASS", 1: "FAIL", 3: "INCOMPLETE"}
@@ -56,6 +58,13 @@ class Source(Part):
     def passes(self) -> bool:
         """Whether its verdict is a good one."""
         return self.verdict.passes
+
+    def cells(self) -> list[str]:
+        """Name, verdict, worst frame and the largest discrepancies there; the reason, if nothing was compared."""
+        if not self.frames:
+            return [self.name, str(self.verdict), plain(self.reason), "", ""]
+        worst = self.worst
+        return [self.name, str(self.verdict), worst.frame, metres(worst.position.max), radians(worst.rotation.max)]
 
     @property
     def worst(self) -> FrameResult:
@@ -200,3 +209,32 @@ class Report(Part):
     lint: list[Lint]
     regression: Regression | None = None
     environment: Environment
+
+    @property
+    def passes(self) -> bool:
+        """Whether the robot passes the gate: `assert report.passes, report`."""
+        return self.verdict.passes
+
+    def __str__(self) -> str:
+        header, rows = self._table()
+        return "\n".join([self._headline(), *text_table(header, rows), *self._causes()])
+
+    def __repr__(self) -> str:
+        return f"<Report {self._headline()}>"
+
+    def _repr_html_(self) -> str:
+        header, rows = self._table()
+        return html_lines([self._headline(), *self._causes()]) + html_table(header, rows)
+
+    def _headline(self) -> str:
+        return plain(f"{self.verdict.word} {self.verdict.sentence}")
+
+    def _table(self) -> tuple[list[str], list[list[str]]]:
+        """A row a source: verdict, worst frame and largest discrepancies."""
+        header = ["source", "verdict", "worst frame", "position", "rotation"]
+        return header, [source.cells() for source in self.sources if not source.reference]
+
+    def _causes(self) -> list[str]:
+        """Why sources disagree, a line a change, each once."""
+        changes = [c for s in self.sources if s.explanation and not s.passes for c in s.explanation.changes]
+        return [plain(f"  why: {text}") for text in dict.fromkeys(change.text for change in changes)]

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 
-from harness.description.model import RobotModel, Tolerance
+from harness.description.model import RobotModel
+from harness.description.model_file import Tolerance
 from harness.engines.registry import REFERENCE, adapter_of, kind_of, registered
 from harness.errors import EngineUnavailable, InputError, MappingError, nearest
 from harness.run.options import Options

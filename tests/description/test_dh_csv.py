@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.description.dh import DHRow
+from harness.description.dh import DHRow, DHTable
 from harness.description.dh_csv import read_dh_csv
 from harness.errors import ModelFileError
 
@@ -81,3 +81,10 @@ def test_suspect_numbers_are_told(tmp_path: Path) -> None:
         ("dh.csv:2: a alpha", "1.5708 is pi/2 cut short"),
         ("dh.csv:3: b alpha", "90 rad is more than a turn: degrees?"),
     ]
+
+
+def test_the_kind_of_a_row_that_is_not_there() -> None:
+    table = DHTable((DHRow(name="elbow", kind="prismatic", a=0.0, alpha=0.0, d=0.0, theta=0.0),))
+    assert table.kind("elbow") == "prismatic"
+    with pytest.raises(KeyError, match=r"no row 'elbo'; did you mean 'elbow'"):
+        table.kind("elbo")
