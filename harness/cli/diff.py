@@ -19,8 +19,8 @@ from harness.difference.differences import Diff, diff, remarks
 from harness.difference.identify import identify
 from harness.difference.operands import read_operand
 from harness.errors import InputError
-from harness.kinematics.invariants import Difference
-from harness.kinematics.side_by_side import COLUMNS, Unit, less, turned
+from harness.kinematics.invariants import ParameterDifference
+from harness.kinematics.side_by_side import COLUMNS, Unit, difference_of, with_matching_normals
 from harness.report.text import metres, plain, radians
 
 CHANGED = 1e-9
@@ -113,7 +113,7 @@ def _tables(found: Diff) -> None:
     for name, unit in COLUMNS:
         for head in (f"A {name} [{'mm' if unit == 'm' else 'deg'}]", f"B {name}", "difference"):
             table.add_column(head, justify="right")
-    for a, b in zip(one.rows, turned(one.rows, other.rows, found.convention), strict=True):
+    for a, b in zip(one.rows, with_matching_normals(one.rows, other.rows, found.convention), strict=True):
         cells: list[Text] = [Text(plain(a.name))]
         for name, unit in COLUMNS:
             cells += _cells(float(getattr(a, name)), float(getattr(b, name)), unit)
@@ -128,7 +128,7 @@ def _tables(found: Diff) -> None:
 
 def _cells(a: float, b: float, unit: Unit) -> list[Text]:
     scale = 1e3 if unit == "m" else 180.0 / math.pi
-    difference = less(b, a, unit)
+    difference = difference_of(b, a, unit)
     changed = abs(difference) > CHANGED
     return [
         Text(f"{round(a * scale, 6) + 0.0:.9g}"),
@@ -176,7 +176,7 @@ def identify_command(robot: str, models: Path | None, base: str | None, tip: str
     return 0 if found and found[0].size[0] <= ALIKE else 1
 
 
-def _largest(difference: Difference | None) -> str:
+def _largest(difference: ParameterDifference | None) -> str:
     if difference is None or difference.size <= CHANGED:
         return "0"
     size = amount(difference.size, cast(Unit, difference.unit)).lstrip("+")

@@ -13,7 +13,7 @@ from harness.description.locate import model_folders
 from harness.difference.operands import TIP, TOOLBOX, Operand, read_operand
 from harness.errors import CrosscheckError, EngineFailed, EngineUnavailable, InputError
 from harness.kinematics.canonical import canonical
-from harness.kinematics.invariants import Difference, Matching, match
+from harness.kinematics.invariants import Matching, ParameterDifference, match
 from harness.kinematics.screws import chain_screws, finite_steps
 from harness.workers.packaged_tables import packaged_tables
 
@@ -25,8 +25,8 @@ class Likeness:
     """How a known table differs: its largest length and angle differences, None if there is none to differ, and joint signs."""
 
     name: str
-    length: Difference | None
-    angle: Difference | None
+    length: ParameterDifference | None
+    angle: ParameterDifference | None
     signs: tuple[int, ...]
 
     @property
@@ -67,7 +67,7 @@ def rows_of(operand: Operand) -> tuple[DHRow, ...] | str:
 
 
 def _likeness(name: str, matching: Matching) -> Likeness:
-    def largest(unit: str) -> Difference | None:
+    def largest(unit: str) -> ParameterDifference | None:
         return max((d for d in matching.differences if d.unit == unit), key=lambda d: d.size, default=None)
 
     return Likeness(name, largest("m"), largest("rad"), matching.signs)
