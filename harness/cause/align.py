@@ -1,4 +1,4 @@
-"""Two chains laid on each other as well as base, tool, joint signs and zero offsets allow: a start for fitting the rest."""
+"""Two chains aligned as well as base, tool, joint signs and zero offsets allow: a start for fitting the rest."""
 
 from __future__ import annotations
 
@@ -12,20 +12,24 @@ from harness.kinematics.canonical import Canonical, canonical
 from harness.kinematics.invariants import match, zero_offsets
 from harness.kinematics.mechanism import Parameter
 from harness.kinematics.recipes import TableRecipe, mixed
-from harness.kinematics.screws import chain_screws, fit_gauge
+from harness.kinematics.screws import Screws, chain_screws, fit_gauge
 from harness.se3 import Array
 
-PARALLEL = 1e-3
-NOTHING = 1e-9
+PARALLEL = 1e-3  # sine of the angle below which two axes count as parallel
+NOTHING = 1e-9  # m or rad: a smaller change is left out
 
 
 def aligned(state: State) -> State | None:
-    """The state with signs, zero offsets, base and tool of `a` made to fit `b`; None if either is no chain of unit screws."""
+    """The state with signs, zero offsets, base and tool of `a` fitted to `b`.
+
+    None if either side is no chain of unit screws, if `a` has no model, or if something is changed already.
+    """
     a = state.a
     if a is None or state.shifts or state.inverse:
         return None
     prismatic, names = list(a.mechanism.prismatic), list(a.mechanism.joints)
-    forms = [_form(T, prismatic, names, state) for T in (state.problem.check.a, state.problem.check.b)]
+    observed = state.problem.observed["check"]
+    forms = [_canonical_form(T, prismatic, names, state) for T in (observed.a, observed.b)]
     if forms[0] is None or forms[1] is None:
         return None
     rows = [form.rows for form in forms if form is not None]
@@ -41,29 +45,31 @@ def aligned(state: State) -> State | None:
         number = ("d" if slides else "theta") if isinstance(a, TableRecipe) else "zero"
         if abs(offset) > NOTHING:
             zeros[Knob("a", Parameter(name, number, "m" if slides else "rad"))] = offset
-    return _based(state.shifted(zeros), prismatic)
+    return _with_base_and_tool(state.shifted(zeros), prismatic)
 
 
-def _steps(T: Array, count: int, state: State) -> Array:
-    """Of the tip, the placements at zero and after each joint's step: the last rows of the check."""
-    return np.asarray(T[-count - 1 :, state.problem.fitted[-1]])
+def _tip_screws(T_check: Array, prismatic: list[bool], state: State) -> Screws:
+    """Joint screws of the chain up to the last fitted frame, from placements at the part "check" of the probe."""
+    problem = state.problem
+    return chain_screws(problem.probe.stepped(T_check)[:, problem.fitted_frames[-1]], prismatic)
 
 
-def _form(T: Array, prismatic: list[bool], names: list[str], state: State) -> Canonical | None:
+def _canonical_form(T_check: Array, prismatic: list[bool], names: list[str], state: State) -> Canonical | None:
+    """Canonical parameters of one side's chain; None if it is no chain of unit screws."""
     try:
-        return canonical(chain_screws(_steps(T, len(names), state), prismatic), prismatic, "standard", names, PARALLEL)
+        return canonical(_tip_screws(T_check, prismatic, state), prismatic, "standard", names, PARALLEL)
     except ValueError:
         return None
 
 
-def _based(state: State, prismatic: list[bool]) -> State:
-    """With base and tool fitted, as six numbers each."""
-    n, problem = len(prismatic), state.problem
-    T_a, T_b = state.placements(problem.check)
-    screws = [chain_screws(_steps(T, n, state), prismatic).S for T in (T_a, T_b)]
-    X = fit_gauge(screws[0], screws[1]).T_b_a
-    tip = problem.fitted[-1]
-    Y = fit.behind((X @ T_a)[:, tip : tip + 1], T_b[:, tip : tip + 1])[0]
+def _with_base_and_tool(state: State, prismatic: list[bool]) -> State:
+    """The state with base and tool fitted, as six numbers each."""
+    problem = state.problem
+    T_a, T_b = state.placements("check")
+    S_a, S_b = (_tip_screws(T, prismatic, state).S for T in (T_a, T_b))
+    X = fit_gauge(S_a, S_b).T_b_a
+    tip = problem.fitted_frames[-1]
+    Y = fit.fit_constant_offset((X @ T_a)[:, tip : tip + 1], T_b[:, tip : tip + 1])[0]
     if isinstance(state.a, TableRecipe):
         base, tool = state.a.table.base, state.a.table.tool
         X, Y = se3.inverse(base) @ X @ base, tool @ Y @ se3.inverse(tool)

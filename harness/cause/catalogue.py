@@ -22,7 +22,7 @@ CUT = (3.14, 3.1416, 3.14159, 3.141593, 3.1415927, 3.14159265)
 DEGREES = 180.0 / math.pi
 
 
-def structural(state: State) -> Iterator[State]:
+def structural_repairs(state: State) -> Iterator[State]:
     """Every structural repair of both sides, one at a time."""
     yield from (state.edited(change, a, state.b) for change, a in _of_joints(state))
     yield from (state.edited(change, a, state.b) for change, a in _of_recipe(state.a, "a", state.problem.labels[0], state))
@@ -33,14 +33,14 @@ def structural(state: State) -> Iterator[State]:
         yield state.edited(Change(kind="inverse", side="source", text=text), state.a, state.b, inverse=True)
 
 
-def fine(state: State) -> Iterator[State]:
+def fine_repairs(state: State) -> Iterator[State]:
     """Those repairs that may explain a small difference: pi cut short, float32."""
     yield from (state.edited(change, a, state.b) for change, a in _of_digits(state.a, state.problem.labels[0], "a"))
     yield from (state.edited(change, state.a, b) for change, b in _of_digits(state.b, state.problem.labels[1], "b"))
 
 
 def _of_joints(state: State) -> Iterator[tuple[Change, Recipe]]:
-    """What the source does with q: signs, order, couplings, degrees. Shown on the reference: it takes P q for q."""
+    """What the source does with q: signs, order, couplings, degrees. The reference is made to do the same: it takes P q for q."""
     if state.a is None:
         return
     mechanism, source = state.a.mechanism, state.problem.sources[1]
@@ -88,6 +88,7 @@ def _of_joints(state: State) -> Iterator[tuple[Change, Recipe]]:
 
 
 def _of_recipe(recipe: Recipe | None, end: End, label: str, state: State) -> Iterator[tuple[Change, Recipe]]:
+    """Units, and what only a table or only a URDF can have wrong."""
     if recipe is None:
         return
     for factor, unit in ((1000.0, "metres where millimetres are meant"), (0.001, "millimetres where metres are meant")):
@@ -115,6 +116,7 @@ def _scaled(recipe: Recipe, length: float, angle: float) -> Recipe:
 
 
 def _of_table(recipe: TableRecipe, end: End, label: str, source: str) -> Iterator[tuple[Change, Recipe]]:
+    """The other convention, the product in reverse order, the tool left out."""
     table = recipe.table
     other: Convention = "modified" if table.convention == "standard" else "standard"
     text = f"convention: {label} reads its rows as {table.convention} DH; as {other} DH they agree"
@@ -139,6 +141,7 @@ def _of_table(recipe: TableRecipe, end: End, label: str, source: str) -> Iterato
 
 
 def _of_urdf(recipe: UrdfRecipe, end: End, label: str, other: str) -> Iterator[tuple[Change, Recipe]]:
+    """Another axis of one joint, the tool's joint left out."""
     for joint in recipe.urdf.joint_list:
         if joint.name not in recipe.joints.names or joint.type == "fixed":
             continue
@@ -193,6 +196,7 @@ def _written_out(x: float, angle: bool) -> float:
 
 
 def _uncut(x: float) -> float:
+    """The multiple of pi that was meant by an angle written with too few digits; else the angle itself."""
     truncation = find_truncation(repr(x))
     return x if truncation is None else math.copysign(_nearest_multiple(x), x)
 
@@ -202,12 +206,13 @@ def _nearest_multiple(x: float) -> float:
 
 
 def _cut(x: float, pi: float) -> float:
+    """A multiple of pi / 12 with another value of pi; any other angle itself."""
     twelfths = round(x / (math.pi / 12))
     return twelfths * pi / 12 if twelfths and abs(x - twelfths * math.pi / 12) < 1e-14 else x
 
 
 def _numbers(recipe: Recipe, edit: Callable[[float, bool], float]) -> Recipe:
-    """Every number of a description changed; edit(x, whether it is an angle)."""
+    """A description with every number changed: x becomes edit(x, whether x is an angle)."""
     if isinstance(recipe, TableRecipe):
         rows = tuple(
             replace(r, a=edit(r.a, False), d=edit(r.d, False), alpha=edit(r.alpha, True), theta=edit(r.theta, True))
@@ -222,14 +227,14 @@ def _numbers(recipe: Recipe, edit: Callable[[float, bool], float]) -> Recipe:
 
 
 def _angles(recipe: Recipe, change: Callable[[float], float]) -> tuple[Recipe, list[str]]:
-    """Every angle of a description changed, and those that differ by it, as text."""
-    found: list[str] = []
+    """A description with every angle changed, and the angles that become another number, as text."""
+    edited_angles: list[str] = []
 
     def edit(x: float, angle: bool) -> float:
         y = change(x) if angle else x
         if y != x:
-            found.append(repr(x))
+            edited_angles.append(repr(x))
         return y
 
     edited = _numbers(recipe, edit)
-    return edited, list(dict.fromkeys(found))
+    return edited, list(dict.fromkeys(edited_angles))

@@ -1,4 +1,4 @@
-"""Which change of one number of a mechanism makes its placements those that were seen: least squares in one unknown.
+"""Which change of one number of a mechanism brings its placements to those that were observed: least squares in one unknown.
 
 It is solved for every parameter globally: a length enters positions linearly, an angle as a cosine and a sine, so that the
 sum of squares is known for every angle.
@@ -19,8 +19,13 @@ POLISH = 4
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What is to be reached: placements T (N, F, 4, 4) of the named frames at the configurations q (N, n)."""
+class Target:
+    """The placements that are to be reached.
+
+    q: configurations (N, n) [rad or m].
+    names: names of F frames.
+    T: their placements, (N, F, 4, 4) [m].
+    """
 
     q: Array
     names: tuple[str, ...]
@@ -36,7 +41,7 @@ def errors(T_a: Array, T_b: Array) -> tuple[float, float]:
 
 
 def residuals(T: Array, wanted: Array) -> Array:
-    """(N, F, 6): position [m] and the sine of the rotation [rad] that lead from T to `wanted`, in the base frame's axes."""
+    """What leads from placements T to `wanted`, (N, F, 6): translation [m] and sine of the rotation, in the base frame's axes."""
     R = wanted[..., :3, :3] @ np.swapaxes(T[..., :3, :3], -1, -2)
     out = np.empty((*T.shape[:2], 6))
     out[..., :3] = wanted[..., :3, 3] - T[..., :3, 3]
@@ -47,7 +52,12 @@ def residuals(T: Array, wanted: Array) -> Array:
 
 
 def derivatives(T: Array, xi: Array, moves: Mask) -> Array:
-    """How each parameter moves every frame, (K, N, F, 6): velocity of its origin, and angular velocity."""
+    """How each of K parameters moves every frame, (K, N, F, 6): velocity of its origin, then its angular velocity.
+
+    T: placements (N, F, 4, 4).
+    xi: the parameters' twists (K, N, 6), linear part first.
+    moves: which frames each parameter moves, (K, F).
+    """
     w = xi[:, :, None, 3:]
     out = np.empty((*xi.shape[:2], T.shape[1], 6))
     out[..., :3] = xi[:, :, None, :3] + np.cross(w, T[None, :, :, :3, 3])
@@ -55,18 +65,22 @@ def derivatives(T: Array, xi: Array, moves: Mask) -> Array:
     return np.asarray(out * moves[:, None, :, None])
 
 
-def each_alone(mechanism: Mechanism, seen: Seen) -> list[tuple[float, Parameter, float]]:
-    """For every parameter that matters the change that alone comes nearest: (root mean square left, parameter, change)."""
-    T, xi, moves = mechanism.twists(seen.q, seen.names)
-    found = []
+def each_alone(mechanism: Mechanism, target: Target) -> list[tuple[float, Parameter, float]]:
+    """For every parameter that moves a frame, the change that alone comes nearest to the target.
+
+    Returns the root mean square of what it leaves, the parameter, and the change [m or rad].
+    """
+    T, xi, moves = mechanism.twists(target.q, target.names)
+    fits = []
     for k, parameter in enumerate(mechanism.parameters):
         if not moves[k].any():
             continue
-        delta = _length(T, xi[k], moves[k], seen.T) if parameter.unit == "m" else _angle(T, xi[k], moves[k], seen.T)
+        best = _best_length if parameter.unit == "m" else _best_angle
+        delta = best(T, xi[k], moves[k], target.T)
         if delta is not None:
-            left = seen.T - _moved(T, xi[k], moves[k], delta)
-            found.append((float(np.sqrt((left**2).mean())), parameter, delta))
-    return found
+            gap = target.T - _moved(T, xi[k], moves[k], delta)
+            fits.append((float(np.sqrt((gap**2).mean())), parameter, delta))
+    return fits
 
 
 def _moved(T: Array, xi: Array, moves: Mask, delta: float) -> Array:
@@ -89,15 +103,16 @@ def _moved(T: Array, xi: Array, moves: Mask, delta: float) -> Array:
     return out
 
 
-def _length(T: Array, xi: Array, moves: Mask, wanted: Array) -> float | None:
+def _best_length(T: Array, xi: Array, moves: Mask, wanted: Array) -> float | None:
+    """The best shift [m], by linear least squares; None if it moves nothing."""
     v = xi[:, None, :3]
     gap = (wanted - T)[:, moves][..., :3, 3]
     size = float((v**2).sum() * moves.sum())
     return float((gap * v).sum()) / size if size > 0 else None
 
 
-def _angle(T: Array, xi: Array, moves: Mask, wanted: Array) -> float | None:
-    """The best of all angles, by a scan of the sum of squares, then Gauss-Newton on what is really left."""
+def _best_angle(T: Array, xi: Array, moves: Mask, wanted: Array) -> float | None:
+    """The best of all angles [rad], by a scan of the sum of squares, then by Gauss-Newton; None if it turns nothing."""
     C0, Cc, Cs = _harmonics(T, xi, moves)
     gap = (wanted - T)[:, moves, :3] + (T[:, moves, :3] - C0)
     basis = np.stack([Cc.ravel(), Cs.ravel()])
@@ -123,7 +138,10 @@ def _harmonics(T: Array, xi: Array, moves: Mask) -> tuple[Array, Array, Array]:
     return C0, (zero - half) / 2.0, quarter - C0
 
 
-def behind(T: Array, wanted: Array) -> Array:
-    """The constant Y (4, 4) of each frame for which T Y comes nearest to `wanted`, (F, 4, 4)."""
+def fit_constant_offset(T: Array, wanted: Array) -> Array:
+    """For each frame the constant transform Y for which T Y comes nearest to `wanted`, (F, 4, 4).
+
+    T, wanted: placements (N, F, 4, 4).
+    """
     gap = se3.inverse(T) @ wanted
     return np.array([se3.mean_transform(gap[:, f]) for f in range(gap.shape[1])])

@@ -18,7 +18,7 @@ from harness.se3 import Array
 SAME = 1e-9
 
 
-def renamed(state: State) -> Iterator[State]:
+def mapping_repairs(state: State) -> Iterator[State]:
     """Other links and DH frames, and the specified reading, one at a time."""
     b = state.b
     if isinstance(b, UrdfRecipe):
@@ -31,6 +31,7 @@ def renamed(state: State) -> Iterator[State]:
 
 
 def _read_as_specified(state: State, b: UrdfRecipe) -> Iterator[State]:
+    """The URDF read as the specification says, one deviation of the engine at a time."""
     source, reading = state.problem.engines[1], b.reading
     if reading.default_axis != SPECIFIED.default_axis:
         bare = [j.name for j in b.urdf.joint_list if j.axis is None and j.name in b.joints.names]
@@ -58,11 +59,12 @@ def _read_as_specified(state: State, b: UrdfRecipe) -> Iterator[State]:
 def _links(state: State, b: UrdfRecipe) -> dict[str, Array]:
     """Placements (N, 4, 4) of every link that hangs together with the base."""
     names = {name: name for name in b.urdf.links}
-    T = asked(b.bare(b.base, names), b.P).placements(state.problem.seen.q)
+    T = asked(b.bare(b.base, names), b.P).placements(state.problem.observed["fit"].q)
     return dict(zip(names, np.moveaxis(T, 1, 0), strict=True))
 
 
 def _constant(T: Array) -> bool:
+    """Whether placements (N, 4, 4) are the same at all configurations."""
     return bool(np.ptp(T, axis=0).max(initial=0.0) < SAME)
 
 
@@ -77,6 +79,7 @@ def _exchanged(frames: Mapping[str, str], one: str, other: str) -> dict[str, str
 
 
 def _other_base(state: State, b: UrdfRecipe, links: Mapping[str, Array]) -> Iterator[State]:
+    """Placements in another link that never moves relative to the base link."""
     eye = np.broadcast_to(np.eye(4), links[b.base].shape)
     for link, T in links.items():
         if link != b.base and _constant(T) and _differ(T, eye):
@@ -88,7 +91,7 @@ def _other_base(state: State, b: UrdfRecipe, links: Mapping[str, Array]) -> Iter
 def _other_links(state: State, b: UrdfRecipe, links: Mapping[str, Array]) -> Iterator[State]:
     """Frames that ride on the same body at another place, and any link that is just where the reference has the frame."""
     T_a, T_b = state.now
-    for i in state.problem.fitted:
+    for i in state.problem.fitted_frames:
         name = state.problem.names[i]
         here = b.frames.get(name)
         if here is None or here == b.base:
@@ -115,12 +118,14 @@ def _other_labels(state: State, a: TableRecipe) -> Iterator[State]:
     """Another DH frame that is just where the source has the frame."""
     T_a, T_b = state.now
     off = [
-        i for i in state.problem.fitted if max(fit.errors(T_a[:, i : i + 1], T_b[:, i : i + 1])) > max(state.problem.tolerance)
+        i
+        for i in state.problem.fitted_frames
+        if max(fit.errors(T_a[:, i : i + 1], T_b[:, i : i + 1])) > max(state.problem.tolerance)
     ]
     if not off or a.backwards:
         return
     labels = {label: (label, np.eye(4)) for label in a.table.frames}
-    placed = asked(of_table(a.table, labels), a.P).placements(state.problem.seen.q)
+    placed = asked(of_table(a.table, labels), a.P).placements(state.problem.observed["fit"].q)
     for i in off:
         name = state.problem.names[i]
         here, offset = a.frames[name]

@@ -1,4 +1,4 @@
-"""Several numbers at once: Gauss-Newton on exact derivatives, and which pairs and triples would explain what is left."""
+"""Several numbers at once: Gauss-Newton on exact derivatives, and which pairs and triples would explain the difference."""
 
 from __future__ import annotations
 
@@ -8,32 +8,26 @@ from itertools import combinations
 import numpy as np
 
 from harness.cause import fit
-from harness.cause.problem import End, Knob, State
+from harness.cause.problem import ENDS, Knob, State
 from harness.se3 import Array
 
 STEPS = 12
-RANK = 1e-9
-ALIKE = 1e-10
+RANK = 1e-9  # relative size of singular values below which a direction counts as undetermined
+ALIKE = 1e-10  # two numbers move everything alike if the cosine between their effects is this near to 1
 
 
 def knobs(state: State) -> list[Knob]:
     """Every number of both descriptions."""
-    ends: tuple[End, End] = ("a", "b")
-    found = []
-    for end in ends:
-        mechanism = state.mechanism(end)
-        if mechanism is not None:
-            found += [Knob(end, parameter) for parameter in mechanism.parameters]
-    return found
+    mechanisms = [(end, state.mechanism(end)) for end in ENDS]
+    return [Knob(end, parameter) for end, mechanism in mechanisms if mechanism is not None for parameter in mechanism.parameters]
 
 
 def derivatives(state: State, wanted: Sequence[Knob]) -> Array:
-    """How each number moves a relative to b, (K, M): velocities and angular velocities of the fitted frames, stacked."""
+    """How each wanted number moves a relative to b: (K, M), velocities and angular velocities of the fitted frames, stacked."""
     problem = state.problem
-    q, names = problem.seen.q, problem.fitted_names
+    q, names = problem.observed["fit"].q, problem.fitted_names
     rows: dict[Knob, Array] = {}
-    ends: tuple[End, End] = ("a", "b")
-    for end in ends:
+    for end in ENDS:
         own = [k for k in wanted if k.end == end]
         mechanism = state.mechanism(end)
         if not own or mechanism is None:
@@ -45,19 +39,22 @@ def derivatives(state: State, wanted: Sequence[Knob]) -> Array:
     return np.array([rows[k] for k in wanted])
 
 
-def residual(state: State) -> Array:
-    """What leads from a to b, (M,), as `derivatives` counts."""
-    T_a, T_b = (T[:, state.problem.fitted] for T in state.now)
+def gap(state: State) -> Array:
+    """What leads from a to b: (M,), in the order of `derivatives`."""
+    T_a, T_b = (T[:, state.problem.fitted_frames] for T in state.now)
     return fit.residuals(T_a, T_b).ravel()
 
 
 def polish(state: State) -> State | None:
-    """The shifts fitted together, None if they do not converge. What they leave undetermined takes the shortest step."""
+    """The state with its shifts fitted together; None if they do not converge.
+
+    Where several changes of the numbers do equally well, the smallest is taken.
+    """
     if not set(state.shifts) <= set(knobs(state)):  # an edit has taken the number out
         return None
     last, best = np.inf, state
     for _ in range(STEPS):
-        r = residual(state)
+        r = gap(state)
         size = float(r @ r)
         if not np.isfinite(size) or (size > 4.0 * last + 1e-30):
             return None
@@ -76,9 +73,14 @@ def polish(state: State) -> State | None:
 
 
 def combined(state: State, count: int, most: int) -> list[State]:
-    """The `most` best sets of `count` (2 or 3) numbers to first order, by linear least squares on each: starts for `polish`."""
+    """States with `count` numbers more that explain the difference to first order, best first: starts for `polish`.
+
+    Each set of numbers is solved by linear least squares.
+    count: how many numbers are changed together, 2 or 3.
+    most: how many states are returned.
+    """
     every = knobs(state)
-    J, r = derivatives(state, every), residual(state)
+    J, r = derivatives(state, every), gap(state)
     sizes = np.sqrt((J * J).sum(axis=1))
     useful = [i for i in range(len(every)) if sizes[i] > 1e-9]
     J = J[useful] / sizes[useful, None]
@@ -89,8 +91,8 @@ def combined(state: State, count: int, most: int) -> list[State]:
         return []
     A = G[sets[:, :, None], sets[:, None, :]]
     b = h[sets]
-    fine = np.linalg.det(A) > 1e-8
-    sets, A, b = sets[fine], A[fine], b[fine]
+    solvable = np.linalg.det(A) > 1e-8
+    sets, A, b = sets[solvable], A[solvable], b[solvable]
     x = np.linalg.solve(A, b[..., None])[..., 0]
     gain = (x * b).sum(axis=1)
     states = []

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
 from harness.cause.explain import explain
 from harness.cause.first_difference import first_difference
-from harness.cause.problem import Problem, Seen, State
+from harness.cause.probe import PARTS, Probe
+from harness.cause.problem import Problem, State
 from harness.certificate.certify import Sampled, certify, sample
 from harness.certificate.interpolation import GRID_LIMIT, Axis
 from harness.description.dh import Convention
@@ -18,11 +18,9 @@ from harness.difference.result import Difference, Largest
 from harness.kinematics.invariants import match
 from harness.kinematics.mechanism import Mechanism
 from harness.kinematics.recipes import Recipe
-from harness.kinematics.screws import finite_steps
 from harness.kinematics.side_by_side import canonical_side
 from harness.se3 import Array
 
-FITTED, CHECKED = 16, 48
 SLIDE = 0.5  # m, range of prismatic joints
 
 
@@ -45,7 +43,7 @@ def diff(a: Operand, b: Operand, tolerance: tuple[float, float]) -> Difference:
     explanation = None if same else explain(problem)
     mechanism = _mechanism(problem.a)
     unexplained = "" if same or explanation else first_difference(problem, mechanism.joints, mechanism.prismatic)
-    errors = [max(x) for x in zip(start.errors(), start.errors(problem.check), strict=True)]
+    errors = [max(x) for x in zip(*(start.errors(part) for part in PARTS), strict=True)]
     recipes = (problem.a, problem.b) if first is a else (problem.b, problem.a)
     convention: Convention = next((o.table.convention for o in (a, b) if o.table is not None), "standard")
     tables = [canonical_side(_mechanism(recipe), convention, TIP) for recipe in recipes]
@@ -77,30 +75,22 @@ def _problem(a: Operand, b: Operand, names: dict[str, str], tolerance: tuple[flo
     """names: b's joint for each of a's. Joints are called as a calls them."""
     both_urdf = a.table is None and b.table is None
     recipes = (a.recipe(a.joints, {j: j for j in a.joints}, both_urdf), b.recipe(a.joints, names, False))
-    q = _configurations(a.prismatic)
-    T = [recipe.mechanism.placements(q, (TIP,)) for recipe in recipes]
-    seen, check = (Seen(q[part], T[0][part], T[1][part]) for part in (slice(FITTED), slice(FITTED, None)))
+    reach = np.where(a.prismatic, SLIDE, math.pi)  # whole turns, and half a metre either way
+    probe = Probe.within(-reach, reach, a.prismatic)
+    T_a, T_b = (recipe.mechanism.placements(probe.q, (TIP,)) for recipe in recipes)
     labels = (a.name, b.name) if a.name != b.name else (a.label, b.label)
     return Problem(
         a=recipes[0],
         b=recipes[1],
         names=(TIP,),
         rigid=frozenset(),
-        seen=seen,
-        check=check,
+        probe=probe,
+        observed=probe.observed(T_a, T_b),
         tolerance=tolerance,
-        behind={},
         labels=labels,
         sources=labels,
         engines=labels,
     )
-
-
-def _configurations(prismatic: Sequence[bool]) -> Array:
-    """Random ones, whole turns and half a metre; then zero and one finite step of each joint, as the search wants them."""
-    reach = np.where(prismatic, SLIDE, math.pi)
-    q = np.random.default_rng(0).uniform(-reach, reach, (FITTED + CHECKED, len(reach)))
-    return np.concatenate([q, np.zeros((1, len(reach))), np.diag(finite_steps(prismatic))])
 
 
 def _bound(problem: Problem) -> Largest | None:

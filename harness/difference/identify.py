@@ -15,7 +15,7 @@ from harness.difference.operands import TIP, Operand
 from harness.difference.reading import TOOLBOX, Ends, read_operand
 from harness.errors import CrosscheckError, EngineFailed, EngineUnavailable, ExitCode, InputError
 from harness.kinematics.canonical import canonical
-from harness.kinematics.invariants import Difference, Matching, match
+from harness.kinematics.invariants import Matching, ParameterDifference, match
 from harness.kinematics.screws import chain_screws, finite_steps
 from harness.report.notebook import html_lines, html_table, text_table
 from harness.report.text import plain
@@ -32,8 +32,8 @@ class Likeness:
     """How a known table differs: its largest length and angle differences, None if there is none to differ, and joint signs."""
 
     name: str
-    length: Difference | None
-    angle: Difference | None
+    length: ParameterDifference | None
+    angle: ParameterDifference | None
     signs: tuple[int, ...]
 
     @property
@@ -117,7 +117,7 @@ def identify(operand: Operand, models: Path) -> Identification:
     return Identification(operand, tuple(sorted(likenesses, key=lambda one: one.size)), tuple(left_out))
 
 
-def _size(difference: Difference | None) -> str:
+def _size(difference: ParameterDifference | None) -> str:
     if difference is None or difference.size <= CHANGED:
         return "0"
     return f"{amount(difference.size, difference.unit).lstrip('+')} ({difference.name} of {difference.joint})"
@@ -137,7 +137,7 @@ def rows_of(operand: Operand) -> tuple[DHRow, ...] | str:
 
 
 def _likeness(name: str, matching: Matching) -> Likeness:
-    def largest(unit: str) -> Difference | None:
+    def largest(unit: str) -> ParameterDifference | None:
         return max((d for d in matching.differences if d.unit == unit), key=lambda d: d.size, default=None)
 
     return Likeness(name, largest("m"), largest("rad"), matching.signs)

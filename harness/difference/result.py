@@ -14,7 +14,7 @@ from harness.difference.operands import Operand
 from harness.difference.remarks import remarks
 from harness.errors import ExitCode
 from harness.kinematics.invariants import Matching
-from harness.kinematics.side_by_side import COLUMNS, Side, Unit, less, turned
+from harness.kinematics.side_by_side import COLUMNS, Side, Unit, difference_of, with_matching_normals
 from harness.report.notebook import html_lines, html_table, text_table
 from harness.report.text import metres, plain, radians
 
@@ -144,7 +144,7 @@ class Difference:
         if one.problem or other.problem:
             return header, []
         rows = []
-        for a, b in zip(one.rows, turned(one.rows, other.rows, self.convention), strict=True):
+        for a, b in zip(one.rows, with_matching_normals(one.rows, other.rows, self.convention), strict=True):
             row = [Cell(plain(a.name))]
             for name, unit in COLUMNS:
                 row += _cells(float(getattr(a, name)), float(getattr(b, name)), unit)
@@ -168,7 +168,7 @@ class Difference:
 
 def _cells(a: float, b: float, unit: Unit) -> list[Cell]:
     scale = 1e3 if unit == "m" else 180.0 / math.pi
-    difference = less(b, a, unit)
+    difference = difference_of(b, a, unit)
     changed = abs(difference) > CHANGED
     return [
         Cell(f"{round(a * scale, 6) + 0.0:.9g}"),

@@ -1,4 +1,4 @@
-"""What of a mechanism is left when base, tool, joint signs and zero offsets are free: the numbers between neighbouring axes.
+"""What describes a mechanism when base, tool, joint signs and zero offsets are free: the numbers between neighbouring axes.
 
 From canonical DH parameters: a and alpha of each pair of axes, d of each axis between two others. Turning axis i round adds pi
 to the twists beside it and negates d_i; turning a common normal round negates its a and alpha. Of two mechanisms the axes and
@@ -17,8 +17,14 @@ STRAIGHT = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
-class Difference:
-    """One number of two mechanisms: of a joint, or from one to the next; which; both values [m or rad]."""
+class ParameterDifference:
+    """One number of two mechanisms.
+
+    joint: the joint it belongs to, or `one to other` for a number between two joints.
+    name: which number, `a`, `alpha` or `d`.
+    unit: `m` or `rad`.
+    a, b: both values, in that unit.
+    """
 
     joint: str
     name: str
@@ -34,21 +40,29 @@ class Difference:
 
 @dataclass(frozen=True)
 class Matching:
-    """signs: +-1 for each joint; normals: +-1 for each pair of neighbours; differences: of every number that is not free."""
+    """How two mechanisms are brought to differ least.
+
+    signs: +1 or -1 for each joint: whether its axis is turned round.
+    normals: +1 or -1 for each pair of neighbours: whether their common normal is turned round.
+    differences: of every number that base, tool, signs and zero offsets do not change.
+    """
 
     signs: tuple[int, ...]
     normals: tuple[int, ...]
-    differences: tuple[Difference, ...]
+    differences: tuple[ParameterDifference, ...]
 
     @property
-    def largest(self) -> Difference | None:
+    def largest(self) -> ParameterDifference | None:
         """The largest difference, a metre counted as a radian; None if nothing is left to differ (one joint)."""
         return max(self.differences, key=lambda d: d.size, default=None)
 
 
 def match(a: Sequence[DHRow], b: Sequence[DHRow]) -> Matching:
-    """Match standard canonical rows b to a, joint by joint. Both have the same kinds of joints."""
-    best: dict[int, tuple[tuple[float, float, int], tuple[int, ...], tuple[int, ...], tuple[Difference, ...]]] = {
+    """Choose joint signs and normals of b so that its largest difference from a is smallest.
+
+    a, b: standard canonical rows. Both have the same kinds of joints in the same order.
+    """
+    best: dict[int, tuple[tuple[float, float, int], tuple[int, ...], tuple[int, ...], tuple[ParameterDifference, ...]]] = {
         1: ((0.0, 0.0, 0), (1,), (), ()),
         -1: ((0.0, 0.0, 1), (-1,), (), ()),
     }
@@ -59,14 +73,14 @@ def match(a: Sequence[DHRow], b: Sequence[DHRow]) -> Matching:
             options = []
             for previous, (cost, signs, normals, differences) in best.items():
                 normal, link = _link(a[i], b[i], previous != sign, f"{a[i].name} to {a[i + 1].name}")
-                found = (
+                added = (
                     link
                     if i + 1 in free
-                    else (*link, Difference(joint=a[i + 1].name, name="d", unit="m", a=a[i + 1].d, b=sign * b[i + 1].d))
+                    else (*link, ParameterDifference(joint=a[i + 1].name, name="d", unit="m", a=a[i + 1].d, b=sign * b[i + 1].d))
                 )
-                worst = max(cost[0], *(d.size for d in found))
-                total = (worst, cost[1] + sum(d.size for d in found), cost[2] + (sign < 0))
-                options.append((_rounded(total), (*signs, sign), (*normals, normal), (*differences, *found)))
+                worst = max(cost[0], *(d.size for d in added))
+                total = (worst, cost[1] + sum(d.size for d in added), cost[2] + (sign < 0))
+                options.append((_rounded(total), (*signs, sign), (*normals, normal), (*differences, *added)))
             following[sign] = min(options, key=lambda option: option[0])
         best = following
     _, signs, normals, differences = min(best.values(), key=lambda option: option[0])
@@ -78,18 +92,23 @@ def _rounded(cost: tuple[float, float, int]) -> tuple[float, float, int]:
     return round(cost[0], 9), round(cost[1], 9), cost[2]
 
 
-def _link(a: DHRow, b: DHRow, turned: bool, between: str) -> tuple[int, tuple[Difference, ...]]:
-    """The common normal's sign, and the differences it leaves."""
-    twist = b.alpha + (math.pi if turned else 0.0)
+def _link(a: DHRow, b: DHRow, opposite: bool, between: str) -> tuple[int, tuple[ParameterDifference, ...]]:
+    """The sign of one common normal, and the differences of a and alpha that it leaves.
+
+    a, b: the rows that end at the normal.
+    opposite: whether just one of the two neighbouring axes of b is turned round.
+    between: names of both joints.
+    """
+    twist = b.alpha + (math.pi if opposite else 0.0)
     options = []
     for normal in (1, -1):
-        found = (
-            Difference(joint=between, name="a", unit="m", a=a.a, b=normal * b.a),
-            Difference(joint=between, name="alpha", unit="rad", a=a.alpha, b=_near(normal * twist, a.alpha)),
+        differences = (
+            ParameterDifference(joint=between, name="a", unit="m", a=a.a, b=normal * b.a),
+            ParameterDifference(joint=between, name="alpha", unit="rad", a=a.alpha, b=_near(normal * twist, a.alpha)),
         )
-        options.append((round(max(d.size for d in found), 9), -normal, normal, found))
-    _, _, normal, found = min(options, key=lambda option: option[:2])
-    return normal, found
+        options.append((round(max(d.size for d in differences), 9), -normal, normal, differences))
+    _, _, normal, differences = min(options, key=lambda option: option[:2])
+    return normal, differences
 
 
 def _free(rows: Sequence[DHRow]) -> set[int]:
@@ -103,7 +122,12 @@ def _free(rows: Sequence[DHRow]) -> set[int]:
 
 
 def zero_offsets(a: Sequence[DHRow], b: Sequence[DHRow], matching: Matching) -> list[float]:
-    """What to add to theta of each row of a (d, of a prismatic one) so that q_a = sign q_b; 0 where base and tool take it."""
+    """What to add to theta of each row of a (to d of a prismatic one) so that q_a = sign q_b, (n,) [rad or m].
+
+    a, b: standard canonical rows.
+    matching: of b to a.
+    The first and the last are 0: base and tool take them.
+    """
     offsets = [0.0] * len(a)
     for i in range(1, len(a) - 1):
         sign = matching.signs[i]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -25,8 +25,12 @@ ANGLE_STEP, LENGTH_STEP = 1.0, 0.1
 
 @dataclass(frozen=True)
 class Screws:
-    """M: (4, 4) placement at q = 0; S: (n, 6) joint twists, linear part first [m, rad]; residual: largest entry by which
-    the rebuilt chain differs from the original at random configurations."""
+    """The joint screws of a chain.
+
+    M: placement of the tip at q = 0, (4, 4) [m].
+    S: twist of each joint a unit of q, (n, 6), linear part first.
+    residual: largest entry by which the rebuilt chain differs from the original at random configurations; 0 if not tried.
+    """
 
     M: Array
     S: Array
@@ -73,19 +77,33 @@ def finite_steps(prismatic: Sequence[bool]) -> Array:
     return np.where(prismatic, LENGTH_STEP, ANGLE_STEP)
 
 
+def step_configurations(prismatic: Sequence[bool]) -> Array:
+    """The configurations from which screws are read, (n + 1, n): zero, then one finite step of each joint [rad or m]."""
+    return np.concatenate([np.zeros((1, len(prismatic))), np.diag(finite_steps(prismatic))])
+
+
+def chain_screws(T: Array, prismatic: list[bool]) -> Screws:
+    """Joint screws from placements at the step configurations. Whether they rebuild the chain elsewhere is not tried.
+
+    T: placements of the tip at `step_configurations`, (n + 1, 4, 4).
+    prismatic: for each joint whether it slides.
+    """
+    steps = finite_steps(prismatic)
+    S = np.array([log(T[i + 1] @ se3.inverse(T[0])) / steps[i] for i in range(len(prismatic))]).reshape(-1, 6)
+    return Screws(T[0], S, 0.0)
+
+
 def screws(chain: Chain, prismatic: list[bool], rng: np.random.Generator) -> Screws:
     """Joint screws of a chain of which only placements are known, and how well they rebuild it.
 
-    prismatic: which joints slide (their step is 0.1 m, else 1 rad).
+    chain: from q (N, n) to placements of the tip, (N, 4, 4).
+    prismatic: for each joint whether it slides (its step is then 0.1 m, else 1 rad).
+    rng: draws the 16 configurations at which the rebuilt chain is compared.
     """
-    n = len(prismatic)
-    steps = finite_steps(prismatic)
-    T = chain(np.concatenate([np.zeros((1, n)), np.diag(steps)]))
-    M, M_inverse = T[0], se3.inverse(T[0])
-    S = np.array([log(T[i + 1] @ M_inverse) / steps[i] for i in range(n)]).reshape(n, 6)
-    q = rng.uniform(-3.0, 3.0, (16, n)) * np.where(prismatic, 0.2, 1.0)
-    rebuilt = np.array([rebuild(M, S, q_k) for q_k in q])
-    return Screws(M, S, float(np.abs(rebuilt - chain(q)).max(initial=0.0)))
+    read = chain_screws(chain(step_configurations(prismatic)), prismatic)
+    q = rng.uniform(-3.0, 3.0, (16, len(prismatic))) * np.where(prismatic, 0.2, 1.0)
+    rebuilt = np.array([rebuild(read.M, read.S, q_k) for q_k in q])
+    return replace(read, residual=float(np.abs(rebuilt - chain(q)).max(initial=0.0)))
 
 
 def rebuild(M: Array, S: Array, q: Array) -> Array:
@@ -98,8 +116,13 @@ def rebuild(M: Array, S: Array, q: Array) -> Array:
 
 @dataclass(frozen=True)
 class Gauge:
-    """T_b_a: the one transform with S_b = Ad(T_b_a) S_a; residuals: (n, 6) what it leaves; rank: how many
-    directions of rotation and of translation the axes determine, (3, 3) if all; free: in words, what they leave open."""
+    """The base transform between two sets of screws.
+
+    T_b_a: the transform (4, 4) for which S_b = Ad(T_b_a) S_a.
+    residuals: what it leaves, S_b - Ad(T_b_a) S_a, (n, 6).
+    rank: how many directions of rotation and of translation the axes determine, (3, 3) if all.
+    free: in words, which directions they leave open.
+    """
 
     T_b_a: Array
     residuals: Array
@@ -121,6 +144,7 @@ def fit_gauge(S_a: Array, S_b: Array) -> Gauge:
 
     Directions are the axes of revolute and the travel of prismatic joints (Kabsch 1976, doi:10.1107/S0567739476001873). If
     all are parallel, the turn about them follows from where the revolute axes stand.
+    S_a, S_b: joint twists (n, 6), linear part first.
     """
     revolute = np.linalg.norm(S_a[:, 3:], axis=1) > 1e-9
     directions = [np.where(revolute[:, None], S[:, 3:], S[:, :3]) for S in (S_a, S_b)]
@@ -159,10 +183,3 @@ def _turn_about(z: Array, a: Array, b: Array) -> float | None:
     if np.linalg.norm(a) < 1e-9:
         return None
     return math.atan2(float((np.cross(a, b) @ z).sum()), float((a * b).sum()))
-
-
-def chain_screws(T: Array, prismatic: list[bool]) -> Screws:
-    """Screws from the placements (n + 1, 4, 4) at zero and after one step of each joint."""
-    steps = finite_steps(prismatic)
-    S = np.array([log(T[i + 1] @ se3.inverse(T[0])) / steps[i] for i in range(len(prismatic))]).reshape(-1, 6)
-    return Screws(T[0], S, 0.0)

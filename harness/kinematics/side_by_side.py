@@ -12,21 +12,26 @@ import numpy as np
 from harness.description.dh import Convention, DHRow
 from harness.kinematics.canonical import canonical
 from harness.kinematics.mechanism import Mechanism
-from harness.kinematics.screws import chain_screws, finite_steps
+from harness.kinematics.screws import chain_screws, step_configurations
 from harness.se3 import Array
 
 Unit = Literal["m", "rad"]
 COLUMNS: tuple[tuple[str, Unit], ...] = (("a", "m"), ("alpha", "rad"), ("d", "m"), ("theta", "rad"))
 
 
-def less(b: float, a: float, unit: Unit) -> float:
-    """b - a; an angle within half a turn."""
+def difference_of(b: float, a: float, unit: Unit) -> float:
+    """b - a, in that unit; an angle within half a turn."""
     return b - a if unit == "m" else math.remainder(b - a, 2.0 * math.pi)
 
 
 @dataclass(frozen=True)
 class Side:
-    """One canonical table: rows, and base and tool transforms; empty if the chain has none, with the reason."""
+    """One canonical table.
+
+    rows: its rows; empty if the chain has no such table.
+    base, tool: transforms (4, 4) [m].
+    problem: why there is no table.
+    """
 
     rows: tuple[DHRow, ...]
     base: Array
@@ -36,9 +41,8 @@ class Side:
 
 def canonical_side(mechanism: Mechanism, convention: Convention, tip: str) -> Side:
     """The canonical table of a mechanism up to the frame `tip`, from n + 1 placements."""
-    n, prismatic = len(mechanism.joints), list(mechanism.prismatic)
-    q = np.concatenate([np.zeros((1, n)), np.diag(finite_steps(prismatic))])
-    screws = chain_screws(mechanism.placements(q, (tip,))[:, 0], prismatic)
+    prismatic = list(mechanism.prismatic)
+    screws = chain_screws(mechanism.placements(step_configurations(prismatic), (tip,))[:, 0], prismatic)
     try:
         form = canonical(screws, prismatic, convention, list(mechanism.joints))
     except ValueError as error:
@@ -46,10 +50,12 @@ def canonical_side(mechanism: Mechanism, convention: Convention, tip: str) -> Si
     return Side(form.rows, form.base, form.tool)
 
 
-def turned(a: Sequence[DHRow], b: Sequence[DHRow], convention: Convention) -> list[DHRow]:
-    """b's rows with each common normal turned as a's, where that is nearer: another table of the same mechanism.
+def with_matching_normals(a: Sequence[DHRow], b: Sequence[DHRow], convention: Convention) -> list[DHRow]:
+    """b's rows with each common normal turned round where that is nearer to a's rows: another table of the same mechanism.
 
-    Turning x_i negates a and alpha along it, and shifts theta before and after it by half a turn.
+    Turning x_i round negates a and alpha along it, and shifts theta before and after it by half a turn.
+    a, b: canonical rows of the same kinds of joints.
+    convention: of both.
     """
     rows = list(b)
     for i in range(len(rows) - 1):

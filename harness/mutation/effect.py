@@ -73,7 +73,7 @@ def _pair(model: RobotModel, source: str, q: Array, names: tuple[str, ...], faul
     ).mechanism.placements(q, names)
     rigid = [i for i, n in enumerate(names) if frames[n].offset is None]
     if rigid:
-        T_a[:, rigid] = T_a[:, rigid] @ fit.behind(T_a[:, rigid], T_b[:, rigid])
+        T_a[:, rigid] = T_a[:, rigid] @ fit.fit_constant_offset(T_a[:, rigid], T_b[:, rigid])
     return T_a, T_b
 
 

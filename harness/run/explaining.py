@@ -9,19 +9,18 @@ import numpy as np
 
 from harness.cause import fit
 from harness.cause.changes import Change
-from harness.cause.explain import explain, shown
+from harness.cause.explain import discrepancy, explain
 from harness.cause.first_difference import first_difference
-from harness.cause.problem import FAITHFUL, Problem, Seen, State
+from harness.cause.probe import PARTS, Probe
+from harness.cause.problem import FAITHFUL, Problem, State
 from harness.description.model import RobotModel
 from harness.engines.registry import kind_of
 from harness.kinematics.descriptions import X_AXIS, Z_AXIS, Reading
 from harness.kinematics.recipes import Recipe, TableRecipe, UrdfRecipe
-from harness.kinematics.screws import finite_steps
 from harness.run.binding import Bound
 from harness.run.outcome import Explained, Run
 from harness.se3 import Array
 
-FITTED, CHECKED = 16, 48
 ROUNDING = 2.0**-46  # of a length: 64 units in the last place, for a product of a dozen transforms
 SHARED = 0.5  # of the tolerance: what another source's repair may leave of this one
 
@@ -31,12 +30,12 @@ def problem_of(
 ) -> Problem:
     """What a search needs to know about a source that disagrees with its reference."""
     known = [i for i in reference.view.available if i in source.view.available]
-    q = configurations(model)
-    both = [bound.mapped(q) for bound in (reference, source)]
+    law = model.configurations
+    probe = Probe.within(law.lower, law.upper, [not turns for turns in law.revolute])
+    both = [bound.mapped(probe.q) for bound in (reference, source)]
     T_a, T_b = (np.stack([T[i] for i in known], axis=1) for T in both)
     frames = [model.frames.frames[i] for i in known]
     names = tuple(f.name for f in frames)
-    parts = (Seen(q[:FITTED], T_a[:FITTED], T_b[:FITTED]), Seen(q[FITTED:], T_a[FITTED:], T_b[FITTED:]))
     kinds = [kind_of(bound.engine.source) for bound in (reference, source)]
     # Lengths in millimetres taken for metres come with a thousand times the rounding: a right repair leaves that.
     largest = max(float(np.nan_to_num(np.abs(T[..., :3, 3])).max(initial=0.0)) for T in (T_a, T_b))
@@ -45,11 +44,11 @@ def problem_of(
     for bound, kind, T in zip((reference, source), kinds, (T_a, T_b), strict=True):
         packaged = bound.engine.takes == "packaged"
         candidates = [] if packaged else list(recipes_of(model, kind, names, offsets))
-        recipes.append(_faithful(candidates, q, names, T, tolerance))
+        recipes.append(_faithful(candidates, probe.q, names, T, tolerance))
     rigid = frozenset(f.name for f in frames if f.relation == "rigid") if kinds[0] != kinds[1] else frozenset()
     if kinds == ["dh", "dh"]:
         recipes[1] = None  # one table: what differs is what is done with it
-    behind = {names[i]: source.view.offsets[k] for i, k in enumerate(known)}
+    offsets_after = {names[i]: source.view.offsets[k] for i, k in enumerate(known)}
     labels = ["dh.csv" if kind == "dh" else "the URDF" for kind in kinds]
     engines = (reference.engine.source, source.engine.source)
     # Two descriptions that are read as they should be differ themselves; else it is the engine that does.
@@ -59,23 +58,14 @@ def problem_of(
         b=recipes[1],
         names=names,
         rigid=rigid,
-        seen=parts[0],
-        check=parts[1],
+        probe=probe,
+        observed=probe.observed(T_a, T_b),
         tolerance=tolerance,
-        behind=behind,
+        offsets_after=offsets_after,
         labels=(labels[0], labels[1]),
         sources=(sources[0], sources[1]),
         engines=engines,
     )
-
-
-def configurations(model: RobotModel) -> Array:
-    """Where both sources are asked, (N, n): random within limits, then zero and one finite step of each joint."""
-    rng = np.random.default_rng(0)
-    law = model.configurations
-    q = rng.uniform(law.lower, law.upper, (FITTED + CHECKED, len(law.lower)))
-    steps = np.diag(finite_steps([not turns for turns in law.revolute]))
-    return np.concatenate([q, np.zeros((1, len(law.lower))), steps])
 
 
 def recipes_of(model: RobotModel, kind: str, names: tuple[str, ...], offsets: Mapping[str, Array]) -> Iterator[Recipe]:
@@ -154,8 +144,7 @@ def _of_another(known: Explained, one: Problem, other: Problem) -> Explained | N
     if e is None or one.names != other.names or kinds[0] != kinds[1] or one.sources != other.sources:
         return None
     apart = [
-        max(pair)
-        for pair in zip(*(fit.errors(x.b, y.b) for x, y in ((one.seen, other.seen), (one.check, other.check))), strict=True)
+        max(pair) for pair in zip(*(fit.errors(one.observed[part].b, other.observed[part].b) for part in PARTS), strict=True)
     ]
     left = (e.after[0] + apart[0], e.after[1] + apart[1])
     if not all(x <= SHARED * limit for x, limit in zip(left, other.tolerance, strict=True)):
@@ -166,5 +155,5 @@ def _of_another(known: Explained, one: Problem, other: Problem) -> Explained | N
         return replace(change, text=change.text.replace(old, new))
 
     changes, others = tuple(map(named, e.changes)), tuple(tuple(map(named, slot)) for slot in e.equivalents)
-    before = shown(State.start(other))
+    before = discrepancy(State.start(other))
     return Explained(replace(e, changes=changes, equivalents=others, before=before, after=left))

@@ -8,7 +8,7 @@ from harness import se3
 from harness.description.dh import DHRow
 from harness.description.model import RobotModel
 from harness.description.urdf import Urdf
-from harness.kinematics.side_by_side import COLUMNS, Unit, canonical_side, less, turned
+from harness.kinematics.side_by_side import COLUMNS, Unit, canonical_side, difference_of, with_matching_normals
 from harness.report.model_parts import DHFrame, Link, ParameterPair, SideBySide, Trees
 from harness.run.explaining import recipes_of
 from harness.run.outcome import Run
@@ -65,7 +65,7 @@ def side_by_side(run: Run) -> SideBySide | None:
         return SideBySide(convention=convention, tip=tip, problem=f"{whose} has no canonical DH table: {problem}")
     limits: dict[Unit, float] = {"m": model.file.tolerance.position, "rad": model.file.tolerance.rotation}
     rows = list(_placed("base", a.base, b.base, limits))
-    for one, other in zip(a.rows, turned(a.rows, b.rows, convention), strict=True):
+    for one, other in zip(a.rows, with_matching_normals(a.rows, b.rows, convention), strict=True):
         rows += _row(one, other, limits)
     return SideBySide(convention=convention, tip=tip, rows=[*rows, *_placed("tool", a.tool, b.tool, limits)])
 
@@ -82,7 +82,7 @@ def _placed(subject: str, T_a: Array, T_b: Array, limits: dict[Unit, float]) -> 
 
 
 def _pair(subject: str, name: str, unit: Unit, a: float, b: float, limits: dict[Unit, float]) -> ParameterPair:
-    difference = less(b, a, unit)
+    difference = difference_of(b, a, unit)
     return ParameterPair(
         subject=subject, parameter=name, unit=unit, table=a, urdf=b, difference=difference, marked=abs(difference) > limits[unit]
     )

@@ -28,7 +28,7 @@ from harness.difference.result import Difference
 from harness.engines.dh_numpy import DHNumpy
 from harness.errors import DescriptionUnavailable, InputError
 from harness.kinematics.invariants import match
-from harness.kinematics.side_by_side import turned
+from harness.kinematics.side_by_side import with_matching_normals
 from tests.helpers import assert_placements_close, transforms
 
 MODELS = default_models_dir()
@@ -143,7 +143,7 @@ def test_turned_normals_are_the_same_table(convention: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     numbers = rng.uniform(-1, 1, (2, 4, 4))
     a, b = (tuple(DHRow.of(f"j{i}", "revolute", row) for i, row in enumerate(rows)) for rows in numbers)
-    shown = turned(a, b, convention)  # type: ignore[arg-type]
+    shown = with_matching_normals(a, b, convention)  # type: ignore[arg-type]
     q = rng.uniform(-3, 3, (5, 4))
     tables = [DHTable(tuple(rows), convention) for rows in (b, shown)]  # type: ignore[arg-type]
     before, after = (DHNumpy(table).placements(q, ("4",)) for table in tables)

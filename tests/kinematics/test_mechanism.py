@@ -117,8 +117,8 @@ def test_one_number_is_found_whatever_its_size(models: dict[str, RobotModel], in
     parameter = rows[index]
     q = np.random.default_rng(0).uniform(-3, 3, (16, 6))
     wanted = mechanism.shifted({parameter: change}).placements(q)
-    found = {p: (left, delta) for left, p, delta in fit.each_alone(mechanism, fit.Seen(q, ("tip",), wanted))}
-    left, delta = found[parameter]
+    fits = {p: (residual, delta) for residual, p, delta in fit.each_alone(mechanism, fit.Target(q, ("tip",), wanted))}
+    residual, delta = fits[parameter]
     off = math.remainder(delta - change, 2 * math.pi) if parameter.unit == "rad" else delta - change
     assert abs(off) < 1e-9
-    assert left < 1e-9
+    assert residual < 1e-9
