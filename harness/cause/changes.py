@@ -25,8 +25,14 @@ _PLAIN = (
 class Change:
     """One change that a repair makes.
 
-    kind: `parameter`, or what the catalogue calls it; side: what is changed; subject: the joint or frame, or `base`, `tool`;
-    parameter: which number; size: by how much [m or rad] it is changed, before: its value on file; unit: of both, or none.
+    kind: `parameter`, or what the catalogue calls it.
+    side: what is changed.
+    subject: the joint or frame, or `base`, `tool`.
+    parameter: which number.
+    size: by how much the number is changed.
+    before: its value on file.
+    unit: of both, `m` or `rad`; empty if the change is none of a number.
+    text: the change in words.
     """
 
     kind: str
@@ -61,9 +67,14 @@ class Change:
 def of_parameter(
     side: Side, parameter: Parameter, size: float, before: float, label: str, wanted_by: str, resolution: float = 0.0
 ) -> Change:
-    """The change of one number of a description. label: the description's name; wanted_by: who would then agree.
+    """The change of one number of a description.
 
-    resolution [m, rad]: what lies below it is not said; it is what the repair leaves.
+    side, parameter: whose number, and which.
+    size: by how much it is changed [m or rad].
+    before: its value on file [m or rad].
+    label: the description's name.
+    wanted_by: who would then agree.
+    resolution: digits below it are not printed: it is what the repair leaves [m, rad].
     """
     unit, digits = parameter.unit, min(12, max(3, math.floor(-math.log10(4.0 * resolution)))) if resolution > 0 else 12
     by = amount(round(size, digits), unit)
@@ -96,7 +107,7 @@ def amount(x: float, unit: str) -> str:
 
 
 def value(x: float, unit: str, digits: int) -> str:
-    """`0.089159 m`, `90 deg`, without whole turns and what lies beyond so many digits [m, rad]."""
+    """`0.089159 m`, `90 deg`: without whole turns, rounded to so many digits of a metre or radian."""
     if unit == "m":
         return f"{round(x, digits) + 0.0:.9g} m"
     return f"{round(math.degrees(math.remainder(x, 2.0 * math.pi)), max(1, digits - 2)) + 0.0:.9g} deg"

@@ -1,4 +1,4 @@
-"""Where two chains differ first, when no repair was found: the first joint whose screw is another."""
+"""Where two chains differ first, when no repair was found: the first joint whose screws differ."""
 
 from __future__ import annotations
 

@@ -24,7 +24,12 @@ ON = 1e-9
 
 @dataclass(frozen=True)
 class Canonical:
-    """Rows, base and tool transforms (4, 4), and the free directions that were fixed by choice."""
+    """A DH table that was computed.
+
+    rows: one for each joint.
+    base, tool: transforms (4, 4) [m].
+    free: in words, the directions that the mechanism leaves open and that were chosen.
+    """
 
     rows: tuple[DHRow, ...]
     base: Array
@@ -46,6 +51,9 @@ def canonical(
 ) -> Canonical:
     """DH parameters of the chain. Raises ValueError if a screw is no joint's (a helical or zero twist).
 
+    screws: of the chain.
+    prismatic, names: for each joint whether it slides, and its name.
+    convention: of the table that is wanted.
     parallel: sine of the angle below which two axes have no common normal of their own.
     """
     axes = _axes(screws, prismatic, names)
@@ -100,7 +108,11 @@ def _normal(
 ) -> tuple[Array, Array, Array]:
     """Common normal of two axes: unit direction, its foot on the first and on the second.
 
-    Parallel axes have many: the one through `near` (a point) is taken. x: the previous x axis, which decides the sign.
+    near: a point. Parallel axes have many common normals: the one through this point is taken.
+    x: the previous x axis, which decides the sign.
+    free: gets a text if the normal is not unique.
+    names: of both joints.
+    parallel: sine of the angle below which the axes count as parallel.
     """
     cross = np.cross(first.z, second.z)
     sine = float(np.linalg.norm(cross))

@@ -23,9 +23,10 @@ X_AXIS, Z_AXIS = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 
 def of_table(table: DHTable, frames: Mapping[str, tuple[str, Array]], backwards: bool = False) -> Mechanism:
-    """The mechanism of a DH table. frames: for each name its DH label and the constant transform behind it, (4, 4).
+    """The mechanism of a DH table.
 
-    backwards: with the product taken in the wrong order, T = tool A_n ... A_1 base, and A_k ... A_1 base on the way.
+    frames: for each name its DH label, and the constant transform (4, 4) from that DH frame to it.
+    backwards: with the product in the wrong order, T = tool A_n ... A_1 base. Frame k is then A_k ... A_1 base.
     """
     if backwards:
         return _backwards(table, frames)
@@ -45,7 +46,7 @@ def of_table(table: DHTable, frames: Mapping[str, tuple[str, Array]], backwards:
 
 
 def gauge(factors: list[Factor], parent: int, owner: str) -> int:
-    """Append a transform that is the identity, with its six numbers as parameters; returns the last factor's index."""
+    """Append an identity transform whose six numbers are parameters of `owner`. Returns the last factor's index."""
     moves = [Factor(parent=0, turns=False, axis=axis, parameter=Parameter(owner, f"move {axis}", "m")) for axis in "xyz"]
     turns = [Factor(parent=0, turns=True, axis=axis, parameter=Parameter(owner, f"turn {axis}", "rad")) for axis in "zyx"]
     return _chained(factors, parent, [*moves, *turns])
@@ -87,7 +88,7 @@ def _framed(table: DHTable, factors: list[Factor], frames: Mapping[str, tuple[in
 
 
 def _row(factors: list[Factor], parent: int, row: DHRow, table: DHTable, joint: int) -> int:
-    """Append the four factors of a row, in the table's order; returns the last one's index."""
+    """Append the four factors of a row, in the order of the table's convention. Returns the last one's index."""
     unit = np.zeros(len(table.joints))
     if row.kind != "fixed":
         unit[joint] = 1.0
@@ -106,8 +107,13 @@ def _row(factors: list[Factor], parent: int, row: DHRow, table: DHTable, joint: 
 
 @dataclass(frozen=True)
 class Reading:
-    """How a URDF is read: default of a missing axis, whether an axis' length stretches a prismatic joint's travel, whether a
-    mimic joint follows its leader or stays at zero, whether joint origins are kept as float32."""
+    """How a URDF is read.
+
+    default_axis: the axis of a joint that has none.
+    stretched: whether the length of its axis multiplies a prismatic joint's travel.
+    mimic: whether a mimic joint follows its leader; else it stays at zero.
+    float32: whether joint origins are kept as float32.
+    """
 
     default_axis: tuple[float, ...] = X_AXIS
     stretched: bool = False
@@ -128,9 +134,13 @@ def of_urdf(
     reading: Reading = SPECIFIED,
     gauged: bool = False,
 ) -> Mechanism:
-    """The mechanism of a URDF seen from link `base`. frames: for each name its link; q is in the order of model_joints.
+    """The mechanism of a URDF seen from link `base`.
 
-    gauged: with base and tool parameters of its own, in front of and behind all frames (but the base link itself).
+    frames: for each name its link.
+    joints: the map from the model's joints to the URDF's.
+    model_joints, prismatic: the model's joints, in the order of q, and which of them slide.
+    reading: how the URDF is read.
+    gauged: with base and tool parameters of its own, before and after every frame but the base link.
     """
     factors: list[Factor] = []
     at = {base: gauge(factors, -1, "base") if gauged else -1}
@@ -150,7 +160,11 @@ def of_urdf(
 
 
 def _joint(factors: list[Factor], parent: int, joint: UrdfJoint, joints: JointMap, n: int, reading: Reading, down: bool) -> int:
-    """Append one joint's factors, backwards and inverted if it is passed from child to parent; returns the last one's index."""
+    """Append the factors of one joint. Returns the last one's index.
+
+    down: whether the joint is passed from parent to child. If not, the factors are inverted and in reverse order.
+    n: number of the model's joints.
+    """
     xyz = zip("xyz", joint.xyz, strict=True)
     steps = [
         Factor(parent=0, turns=False, axis=axis, value=x, row=None, parameter=Parameter(joint.name, f"origin {axis}", "m"))

@@ -53,7 +53,7 @@ class Matching:
 
     @property
     def largest(self) -> ParameterDifference | None:
-        """The largest difference, a metre counted as a radian; None if nothing is left to differ (one joint)."""
+        """The largest difference, a metre counted as a radian. None if there is no number to compare (one joint)."""
         return max(self.differences, key=lambda d: d.size, default=None)
 
 

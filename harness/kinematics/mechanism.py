@@ -1,7 +1,7 @@
 """A mechanism as a tree of elementary factors, each with a named parameter: what a repair edits, and a fit differentiates.
 
 Every description becomes the same thing: turns about and moves along x, y and z, some by a constant, some by a joint. A DH row
-is four of them, a URDF joint seven. Changing the value v of one factor by delta moves all frames behind it by a rigid motion:
+is four of them, a URDF joint seven. Changing the value v of one factor by delta moves all frames after it by a rigid motion:
     T_f(v + delta) = exp(delta xi) T_f(v),   xi = Ad(T_k) e_k   for the placement T_k of the factor
 since a factor commutes with itself. So the twist xi (6,), linear part first, is the exact derivative of every placement.
 """
@@ -25,7 +25,12 @@ AXES = {"x": 0, "y": 1, "z": 2}
 
 
 class Parameter(NamedTuple):
-    """A number of a description: whose (a joint's name, `base` or `tool`), which (`d`, `origin x`, ...), and in m or rad."""
+    """A number of a description.
+
+    owner: whose it is: a joint's name, `base` or `tool`.
+    name: which number: `d`, `origin x`, ...
+    unit: `m` or `rad`.
+    """
 
     owner: str
     name: str
@@ -34,9 +39,16 @@ class Parameter(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Factor:
-    """A turn (`turns`) about, or a move along, an axis by value + row . q; or a constant transform T (4, 4).
+    """A turn about an axis, or a move along it, by value + row . q; or a constant transform.
 
-    `sign` is -1 where the factor is the inverse of what the parameter describes: a URDF joint passed from child to parent.
+    parent: index of the factor before it; -1 for the base frame.
+    turns: whether it turns; else it moves.
+    axis: `x`, `y` or `z`.
+    value: the constant amount [rad or m].
+    row: by how much it changes with each joint, (n,); None if no joint changes it.
+    parameter: the number of the description that `value` is; None if it is none.
+    sign: -1 if the factor is the inverse of what the parameter describes, as for a URDF joint passed from child to parent.
+    T: the constant transform (4, 4); None for a turn or a move.
     """
 
     parent: int
@@ -51,7 +63,12 @@ class Factor:
 
 @dataclass(frozen=True)
 class Mechanism:
-    """Factors in an order in which parents come first (parent -1: the base frame), and the factor behind which each frame is."""
+    """A tree of factors.
+
+    joints, prismatic: name of each joint, and whether it slides.
+    factors: the factors; parents come before their children.
+    frames: for each frame the index of the factor that ends at it; -1 for the base frame.
+    """
 
     joints: tuple[str, ...]
     prismatic: tuple[bool, ...]
@@ -59,7 +76,11 @@ class Mechanism:
     frames: Mapping[str, int]
 
     def placements(self, q: Array, names: Sequence[str] | None = None) -> Array:
-        """Placements of the named frames (all, if None) in the base frame, q (N, n) -> (N, F, 4, 4)."""
+        """Placements in the base frame, (N, F, 4, 4) [m].
+
+        q: configurations (N, n) [rad or m].
+        names: the F frames; None for all, in the order of `frames`.
+        """
         return self._read(self._all(q), names)
 
     def _read(self, T: Array, names: Sequence[str] | None) -> Array:
@@ -67,7 +88,7 @@ class Mechanism:
         return np.moveaxis(T[at], 0, 1)
 
     def _all(self, q: Array) -> Array:
-        """Placement behind every factor, the base first: (len(factors) + 1, N, 4, 4)."""
+        """Placement of the end of every factor, the base first: (len(factors) + 1, N, 4, 4)."""
         T = np.empty((len(self.factors) + 1, len(q), 4, 4))
         T[0] = np.eye(4)
         for k, factor in enumerate(self.factors, start=1):
@@ -82,7 +103,7 @@ class Mechanism:
         return tuple(dict.fromkeys(f.parameter for f in self.factors if f.parameter is not None))
 
     def twists(self, q: Array, names: Sequence[str]) -> tuple[Array, Array, Mask]:
-        """Placements (N, F, 4, 4), the twist of every parameter (K, N, 6), and which frames it moves (K, F)."""
+        """Placements of the named frames (N, F, 4, 4), the twist of each parameter (K, N, 6), and the frames it moves (K, F)."""
         T = self._all(q)
         xi = np.zeros((len(self.parameters), len(q), 6))
         moves = np.zeros((len(self.parameters), len(names)), dtype=bool)
@@ -127,11 +148,11 @@ class Mechanism:
         return self.edited(edit)
 
     def driven(self, P: Array) -> Mechanism:
-        """The mechanism asked at P q instead of q; P (n, n)."""
+        """The mechanism asked at P q instead of q. P: (n, n)."""
         return self.edited(lambda f: f if f.row is None else replace(f, row=tuple(np.dot(f.row, P))))
 
     def ended(self, offsets: Mapping[str, Array]) -> Mechanism:
-        """The named frames with a constant transform (4, 4) behind them."""
+        """The mechanism with frames moved by constant transforms. offsets: for each such frame the transform (4, 4)."""
         factors, frames = list(self.factors), dict(self.frames)
         for name, Y in offsets.items():
             factors.append(Factor(parent=frames[name], T=Y))
@@ -140,7 +161,7 @@ class Mechanism:
 
 
 def _step(before: Array, factor: Factor, q: Array) -> Array:
-    """before @ the factor, (N, 4, 4): only two columns or the origin change."""
+    """Placements (N, 4, 4) of the factor's end, from those of its start. Only two columns or the origin change."""
     if factor.T is not None:
         return np.asarray(before @ factor.T)
     after = before.copy()

@@ -20,13 +20,18 @@ from harness.se3 import Array
 
 
 def asked(mechanism: Mechanism, P: Array | None) -> Mechanism:
-    """The mechanism of an implementation that takes P q for q; P (n, n), None for q itself."""
+    """The mechanism of an implementation that takes P q for q. P: (n, n); None for q itself."""
     return mechanism if P is None else mechanism.driven(P)
 
 
 @dataclass(frozen=True)
 class TableRecipe:
-    """A DH table; frames: for each compared frame its DH label and the constant transform behind it, (4, 4)."""
+    """A DH table as an implementation uses it.
+
+    frames: for each compared frame its DH label, and the constant transform (4, 4) from that DH frame to it.
+    backwards: whether the product is taken in reverse order.
+    P: the implementation takes P q for q, (n, n); None for q itself.
+    """
 
     table: DHTable
     frames: Mapping[str, tuple[str, Array]]
@@ -41,7 +46,15 @@ class TableRecipe:
 
 @dataclass(frozen=True, kw_only=True)
 class UrdfRecipe:
-    """A URDF seen from link `base`; frames: for each compared frame its link; joints: the map from the model's joints."""
+    """A URDF as an implementation uses it, seen from link `base`.
+
+    frames: for each compared frame its link.
+    joints: the map from the model's joints to the URDF's.
+    model_joints, prismatic: the model's joints, in the order of q, and which of them slide.
+    reading: how the URDF is read.
+    P: the implementation takes P q for q, (n, n); None for q itself.
+    gauge: whether base and tool have parameters of their own.
+    """
 
     urdf: Urdf
     base: str

@@ -176,7 +176,7 @@ def _points(S: Array) -> Array:
 
 
 def _turn_about(z: Array, a: Array, b: Array) -> float | None:
-    """Angle about z that turns points a onto points b, both seen along z and from their middle; None if they are one point."""
+    """Angle about z that turns points a onto points b, both seen along z and from their middle. None if each is one point."""
     if len(a) < 2:
         return None
     a, b = (p - np.outer(p @ z, z) for p in (a - a.mean(axis=0), b - b.mean(axis=0)))

@@ -31,8 +31,8 @@ def jacobian(tip: Tip, q: Array, reach: float) -> Array:
         R = np.swapaxes(T_a[:, :3, :3], 1, 2)
         moved = np.einsum("nij,nj->ni", R, T_b[:, :3, 3] - T_a[:, :3, 3]) / reach
         D = R @ T_b[:, :3, :3]
-        turned = 0.5 * np.stack([D[:, 2, 1] - D[:, 1, 2], D[:, 0, 2] - D[:, 2, 0], D[:, 1, 0] - D[:, 0, 1]], axis=1)
-        columns.append(np.concatenate([moved, turned], axis=1) / (2.0 * STEP))
+        rotated = 0.5 * np.stack([D[:, 2, 1] - D[:, 1, 2], D[:, 0, 2] - D[:, 2, 0], D[:, 1, 0] - D[:, 0, 1]], axis=1)
+        columns.append(np.concatenate([moved, rotated], axis=1) / (2.0 * STEP))
     return np.stack(columns, axis=2)
 
 
@@ -42,22 +42,27 @@ def smallest(tip: Tip, q: Array, reach: float) -> Array:
 
 
 def singular(tip: Tip, starts: Array, lower: Array, upper: Array, reach: float, most: int = 3) -> list[tuple[Array, float]]:
-    """Up to `most` singular configurations within limits, of different kinds, and their smallest singular values.
+    """Singular configurations within limits, of different kinds, and their smallest singular values.
 
-    From the nearest of `starts` (N, n) a compass search goes down. Two are of one kind if the same joints cancel each other:
-    those with a share above SHARE in the direction that moves nothing.
+    From the starts nearest to a singularity a compass search goes down. Two configurations are of one kind if the same joints
+    cancel each other: those with a share above SHARE in the direction that moves nothing.
+    tip: from q (N, n) to placements of the tip, (N, 4, 4).
+    starts: configurations (N, n) [rad or m].
+    lower, upper: joint limits (n,) [rad or m].
+    reach: by which lengths are divided [m].
+    most: how many are returned at most.
     """
     values = smallest(tip, starts, reach)
-    found: dict[tuple[bool, ...], tuple[Array, float]] = {}
+    by_kind: dict[tuple[bool, ...], tuple[Array, float]] = {}
     for index in np.argsort(values)[:STARTS]:
         q, value = _down(tip, starts[index], lower, upper, reach)
         if value > SINGULAR:
             continue
         null = np.linalg.svd(jacobian(tip, q[None, :], reach))[2][0, -1]
         kind = tuple(bool(x) for x in np.abs(null) > SHARE)
-        if kind not in found or value < found[kind][1]:
-            found[kind] = (q, value)
-    return sorted(found.values(), key=lambda pair: pair[1])[:most]
+        if kind not in by_kind or value < by_kind[kind][1]:
+            by_kind[kind] = (q, value)
+    return sorted(by_kind.values(), key=lambda pair: pair[1])[:most]
 
 
 def _down(tip: Tip, q: Array, lower: Array, upper: Array, reach: float) -> tuple[Array, float]:
