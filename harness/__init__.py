@@ -23,7 +23,7 @@ if TYPE_CHECKING:
         read_report,
         write_report,
     )
-    from harness.convert.derive import Derived
+    from harness.convert.result import Derived
     from harness.description.dh import DHRow, DHTable
     from harness.description.model import RobotModel
     from harness.difference.identify import Identification
@@ -39,7 +39,7 @@ _HOME = {
          "write_report"),
         "harness.api",
     ),
-    "Derived": "harness.convert.derive",
+    "Derived": "harness.convert.result",
     **dict.fromkeys(("DHRow", "DHTable"), "harness.description.dh"),
     "RobotModel": "harness.description.model",
     "Identification": "harness.difference.identify",

@@ -14,7 +14,8 @@ from typing import TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from harness.convert.derive import Derived, derive
+from harness.convert.derive import derive
+from harness.convert.result import Derived
 from harness.description.dh import Convention, DHTable
 from harness.description.locate import default_models_dir, find_model
 from harness.description.model import RobotModel
@@ -51,8 +52,9 @@ def load_model(robot: str | Path, *, models: str | Path | None = None) -> RobotM
 
     Raises InputError (a file is wrong) or DescriptionUnavailable (the package that holds its URDF is not installed).
     """
-    text = f"{robot}/" if isinstance(robot, Path) else robot
-    return load_folder(find_model(text, Path(models or default_models_dir())))
+    if isinstance(robot, Path):
+        return load_folder(robot)
+    return load_folder(find_model(robot, Path(models or default_models_dir())))
 
 
 class Session:

@@ -6,14 +6,13 @@ from pathlib import Path
 
 import click
 
+from harness import api
 from harness.cli.console import console
 from harness.cli.shared import accepted_option, complete_robots, folders_of, models_option
 from harness.description.locate import default_models_dir
-from harness.description.model import load_model
 from harness.errors import InputError
 from harness.rendering.files import prepare, write
 from harness.report.document import Report
-from harness.report.json_file import read_report
 from harness.report.text import plain
 from harness.verdict.accepted import accepted_from, accepted_text
 
@@ -34,18 +33,18 @@ def accept(robots: tuple[str, ...], models: Path | None, out: Path, accepted: Pa
     prepare(accepted)
     for report in reports:
         path = write(accepted / f"{report.robot.name}.json", accepted_text(accepted_from(report)))
-        note = "" if report.verdict.exit_code == 0 else "; it does not pass: --strict will fail only for what grows from here"
+        note = "" if report.passes else "; it does not pass: --strict will fail only for what grows from here"
         console().print(plain(f"{path}{note}"), markup=False, soft_wrap=True)
     return 0
 
 
 def _current(folder: Path, out: Path) -> Report:
     """The robot's report, if it is one of the files as they are now. Raises InputError."""
-    model = load_model(folder)
+    model = api.load_model(folder)
     path, again = out / f"{model.name}.json", f"crosscheck run {folder.name}"
     if not path.exists():
         raise InputError("no report to accept", where=path, hint=again)
-    report = read_report(path)
+    report = api.read_report(path)
     # What was reviewed must be what is on disk: numbers of older files would be wrong from the start.
     if changed := [name for name, digest in model.hashes.items() if report.robot.hashes.get(name) != digest]:
         raise InputError(f"the report is older than {', '.join(changed)}", where=path, hint=again)

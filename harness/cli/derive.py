@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,15 +10,12 @@ from typing import cast
 import click
 from rich.text import Text
 
+from harness import api
 from harness.cli.console import console
 from harness.cli.shared import gathered
-from harness.convert.derive import Derived, derive
+from harness.convert.result import HEADER, Derived
 from harness.convert.verify import verify
 from harness.description.dh import Convention
-from harness.description.tidy import angle_text, is_identity, number_text, transform_toml
-from harness.description.urdf_file import read_urdf
-from harness.description.urdf_lint import check
-from harness.difference.operands import only_leaf
 from harness.rendering.tables import bare_table
 from harness.report.text import plain
 
@@ -50,15 +46,12 @@ def derive_dh(urdf_path: Path, settings: DeriveSettings) -> int:
 
     Exit code: that of cross-checking the result; 2 if no DH table exists.
     """
-    urdf = read_urdf(urdf_path)
-    check(urdf)
-    base, tip = settings.base or urdf.roots[0], settings.tip or only_leaf(urdf)
-    derived = derive(urdf, base, tip, cast(Convention, settings.convention), settings.source)
+    convention = cast(Convention, settings.convention)
+    derived = api.derive_dh(urdf_path, base=settings.base, tip=settings.tip, convention=convention, source=settings.source)
     robot = settings.name or re.sub(r"[^A-Za-z0-9_.-]", "_", urdf_path.stem).lstrip("_.-") or "robot"
     _show(derived)
     report = verify(derived, robot, settings.source, settings.out)
-    sentence = report.verdict.sentence
-    console().print(Text(plain(sentence), style="green" if report.verdict.exit_code == 0 else "red"), soft_wrap=True)
+    console().print(Text(plain(report.verdict.sentence), style="green" if report.passes else "red"), soft_wrap=True)
     if settings.out is not None:
         console().print(Text(f"written to {plain(str(settings.out / robot))}"), soft_wrap=True)
     return report.verdict.exit_code
@@ -66,16 +59,14 @@ def derive_dh(urdf_path: Path, settings: DeriveSettings) -> int:
 
 def _show(derived: Derived) -> None:
     out = console()
-    out.print(Text(f"{plain(derived.base)} to {plain(derived.tip)}, {derived.table.convention} DH, metres and radians"))
-    table = bare_table("joint", "type", "a", "alpha", "d", "theta")
-    for row in derived.table.rows:
-        cells = (row.name, row.kind, number_text(row.a), angle_text(row.alpha), number_text(row.d), angle_text(row.theta))
-        table.add_row(*(Text(plain(cell)) for cell in cells))
+    out.print(Text(derived.headline()))
+    table = bare_table(*HEADER)
+    for row in derived.rows():
+        table.add_row(*(Text(cell) for cell in row))
     out.print(table)
-    for name, T in (("base", derived.table.base), ("tool", derived.table.tool)):
-        if not is_identity(T):
-            out.print(Text(f"{name}: " + ", ".join(f"{k} = {v}" for k, v in transform_toml(T).items())))
-    for direction in derived.free:
-        out.print(Text(f"fixed by choice: {plain(direction)}", style="yellow"), soft_wrap=True)
-    if math.isfinite(derived.residual):
-        out.print(Text(f"the joint screws rebuild the chain to {derived.residual:.1e}", style="dim"))
+    for line in derived.transforms():
+        out.print(Text(line))
+    for line in derived.choices():
+        out.print(Text(line, style="yellow"), soft_wrap=True)
+    if check := derived.check():
+        out.print(Text(check, style="dim"))

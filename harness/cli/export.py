@@ -6,10 +6,9 @@ from pathlib import Path
 
 import click
 
+from harness import api
 from harness.cli.shared import models_option
 from harness.convert.export_urdf import export_urdf
-from harness.description.locate import default_models_dir, find_model
-from harness.description.model import load_model
 from harness.rendering.files import write
 
 
@@ -19,7 +18,7 @@ from harness.rendering.files import write
 @click.option("--out", type=click.Path(path_type=Path), help="File to write to.  [default: standard output]")
 def export_urdf_command(robot: str, models: Path | None, out: Path | None) -> int:
     """Write a robot model's DH table as a URDF: kinematics only, one link for each DH frame."""
-    text = export_urdf(load_model(find_model(robot, models or default_models_dir())))
+    text = export_urdf(api.load_model(robot, models=models))
     if out is None:
         click.echo(text, nl=False)
     else:

@@ -9,10 +9,10 @@ from rich.console import Console
 from rich.text import Text
 from rich.tree import Tree
 
+from harness import api
 from harness.cli.console import console
 from harness.cli.shared import complete_robots, models_option
-from harness.description.locate import default_models_dir, find_model
-from harness.description.model import RobotModel, load_model
+from harness.description.model import RobotModel
 from harness.description.urdf import Urdf, UrdfJoint
 from harness.description.urdf_file import read_urdf
 from harness.description.urdf_lint import lint
@@ -25,10 +25,10 @@ from harness.report.text import numbers, plain
 @models_option
 def frames(robot: str, models: Path | None) -> int:
     """Show the frame tree: joint types, axes, and what each frame is mapped to."""
-    return show_frames(robot, models or default_models_dir(), console())
+    return show_frames(robot, models, console())
 
 
-def show_frames(robot: str, models: Path, out: Console) -> int:
+def show_frames(robot: str, models: Path | None, out: Console) -> int:
     """Print the frame tree of a robot model or a URDF file. Returns 2 if the URDF is not a tree, else 0."""
     path = Path(robot)
     if path.is_file() or path.suffix in (".urdf", ".xacro", ".xml"):
@@ -36,7 +36,7 @@ def show_frames(robot: str, models: Path, out: Console) -> int:
         findings = lint(urdf)
         _show_tree(urdf, {}, out)
     else:
-        model = load_model(find_model(robot, models))
+        model = api.load_model(robot, models=models)
         findings = model.findings
         _show_dh(model, out)
         if model.urdf is not None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from harness.api import Session
+from harness import api
 from harness.cli.console import console
 from harness.cli.error_line import complain
 from harness.cli.shared import (
@@ -21,7 +21,6 @@ from harness.cli.shared import (
     progress_bar,
 )
 from harness.description.locate import default_models_dir
-from harness.description.model import load_model
 from harness.engines.registry import REFERENCE
 from harness.errors import CrosscheckError, InputError
 from harness.rendering.engine_table import show_engine_table
@@ -155,7 +154,7 @@ def run(settings: RunSettings) -> int:
     codes: list[int] = []
     names: dict[str, Path] = {}
     reports: list[Report] = []
-    with Session(options) as session:
+    with api.Session(options) as session:
         for folder in folders:
             try:
                 reports.append(_checked(session, folder, names, settings))
@@ -172,9 +171,9 @@ def run(settings: RunSettings) -> int:
     return combined(codes)
 
 
-def _checked(session: Session, folder: Path, names: dict[str, Path], settings: RunSettings) -> Report:
+def _checked(session: api.Session, folder: Path, names: dict[str, Path], settings: RunSettings) -> Report:
     """Cross-check one robot, write its reports and print its verdict. `names` collects the folder of each robot name."""
-    model = load_model(folder)
+    model = api.load_model(folder)
     if model.name in names:
         raise InputError(f"robot name {model.name!r} is also that of {names[model.name]}", where=folder)
     names[model.name] = folder

@@ -13,10 +13,9 @@ from pathlib import Path
 
 import click
 
+from harness import api
 from harness.cli.console import console
 from harness.cli.shared import complete_robots, complete_sources, gathered, models_option
-from harness.description.locate import default_models_dir, find_model
-from harness.description.model import load_model
 from harness.engines.registry import REFERENCE
 from harness.errors import EngineUnavailable
 from harness.report.text import plain
@@ -62,7 +61,7 @@ def view(robot: str, models: Path | None, settings: ViewSettings) -> int:
         viser = importlib.import_module("viser")
     except ImportError as error:
         raise EngineUnavailable("view", f"import viser failed: {error}", "pip install 'fk-crosscheck[view]'") from None
-    model = load_model(find_model(robot, models or default_models_dir()))
+    model = api.load_model(robot, models=models)
     options = Options(
         samples=settings.samples,
         seed=settings.seed,

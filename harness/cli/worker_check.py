@@ -10,11 +10,11 @@ from pathlib import Path
 import click
 from rich.text import Text
 
+from harness import api
 from harness.cli.console import console
 from harness.cli.shared import gathered, models_option
 from harness.description.frames_file import EngineNames
-from harness.description.locate import default_models_dir, find_model
-from harness.description.model import RobotModel, load_model
+from harness.description.model import RobotModel
 from harness.engines.registry import description_of
 from harness.errors import EngineFailed, EngineUnavailable
 from harness.report.text import plain
@@ -48,7 +48,7 @@ class WorkerCheckSettings:
 def worker_check(command: tuple[str, ...], settings: WorkerCheckSettings) -> int:
     """Check that a program speaks the worker protocol, and say what is wrong. Exit code 0 if nothing is, else 1."""
     name = settings.name
-    model = load_model(find_model(settings.robot, settings.models or default_models_dir()))
+    model = api.load_model(settings.robot, models=settings.models)
     words = [word.replace("{model}", str(model.folder.resolve())) for word in command]
     greeting = protocol.greeting(description_of(name, model), wanted_frames(name, model))
     first = "answers the greeting with one line of JSON"

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from harness import se3
+from harness.convert.result import Derived, DerivedLink
 from harness.description.dh import Convention, DHRow, DHTable
 from harness.description.tidy import tidy_angle, tidy_length, tidy_transform
 from harness.description.urdf import MOVABLE, UNSUPPORTED, Urdf, UrdfJoint
@@ -20,28 +20,6 @@ from harness.kinematics.screws import screws
 from harness.se3 import Array
 
 RESIDUAL = 1e-9
-
-
-@dataclass(frozen=True)
-class DerivedLink:
-    """A URDF link of the chain: the DH frame it rides on and its constant offset from it, T_dh_link (4, 4)."""
-
-    name: str
-    dh: str
-    offset: Array
-
-
-@dataclass(frozen=True, kw_only=True)
-class Derived:
-    """A DH table, the links of the chain, the free directions fixed by choice, and how well the screws rebuild the chain."""
-
-    urdf: Urdf
-    table: DHTable
-    base: str
-    tip: str
-    links: tuple[DerivedLink, ...]
-    free: tuple[str, ...]
-    residual: float
 
 
 def derive(urdf: Urdf, base: str, tip: str, convention: Convention, source: str) -> Derived:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from harness.convert.derive import Derived
+from harness.convert.result import Derived
 from harness.convert.write_model import write_model
 from harness.description.model import load_model
 from harness.report.document import Report

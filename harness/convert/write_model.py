@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from harness.convert.derive import Derived
+from harness.convert.result import Derived
 from harness.description.dh import DHTable
 from harness.description.tidy import angle_text, is_identity, number_text, transform_toml
 from harness.errors import InputError

@@ -10,7 +10,6 @@ from harness.report.text import metres, numbers, plain, radians
 from harness.report.verdicts import Verdict
 
 _ENTITY = {"<": "&lt;", ">": "&gt;", "&": "&amp;"}
-MARK = {0: "PASS", 1: "FAIL", 3: "INCOMPLETE"}
 # A screenful, whatever the report holds: at most 60 lines.
 SOURCES, CAUSES, OTHERS = 18, 12, 4
 
@@ -20,7 +19,7 @@ def render_markdown(report: Report) -> str:
     compared = [source for source in report.sources if not source.reference]
     ranked = sorted(compared, key=lambda s: (s.passes, s.status != "ran" and not s.required))
     lines = [
-        f"## {MARK[report.verdict.exit_code]}: {_md(report.robot.name)}",
+        f"## {report.verdict.word}: {_md(report.robot.name)}",
         "",
         f"**{_md(report.verdict.sentence)}**",
         "",

@@ -15,13 +15,13 @@ _STYLE = {0: "bold green", 1: "bold red", 3: "bold yellow"}
 MAX_REASONS = 6
 MAX_WARNINGS = 4
 MAX_MOVED = 6
-_WORD = {0: "PASS", 1: "FAIL", 3: "INCOMPLETE"}
 
 
 def show(report: Report, console: Console) -> None:
     """Print verdict, one row a source, and where each disagreement is."""
-    code = report.verdict.exit_code
-    console.print(Text(_WORD[code], style=_STYLE[code]), Text(plain(report.verdict.sentence)), soft_wrap=True)
+    console.print(
+        Text(report.verdict.word, style=_STYLE[report.verdict.exit_code]), Text(plain(report.verdict.sentence)), soft_wrap=True
+    )
     table = bare_table("source", "verdict", "worst frame", "position", "rotation", "for all q", "tolerance", "magnitude")
     for source in report.sources:
         if not source.reference:

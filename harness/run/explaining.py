@@ -120,12 +120,12 @@ def explain_all(run: Run) -> None:
         shared = (_of_another(known, one, problem) for one, known in solved)
         mine = next((known for known in shared if known is not None), None)
         if mine is None:
-            mine = told(problem, run.model)
+            mine = explained(problem, run.model)
             solved.append((problem, mine))
         outcome.explained = mine
 
 
-def told(problem: Problem, model: RobotModel) -> Explained:
+def explained(problem: Problem, model: RobotModel) -> Explained:
     """The repair that explains the difference, or where the two part."""
     explanation = explain(problem)
     if explanation is not None:
@@ -146,8 +146,8 @@ def _of_another(known: Explained, one: Problem, other: Problem) -> Explained | N
     apart = [
         max(pair) for pair in zip(*(fit.errors(one.observed[part].b, other.observed[part].b) for part in PARTS), strict=True)
     ]
-    left = (e.after[0] + apart[0], e.after[1] + apart[1])
-    if not all(x <= SHARED * limit for x, limit in zip(left, other.tolerance, strict=True)):
+    residual = (e.after[0] + apart[0], e.after[1] + apart[1])
+    if not all(x <= SHARED * limit for x, limit in zip(residual, other.tolerance, strict=True)):
         return None
     old, new = one.engines[1], other.engines[1]
 
@@ -156,4 +156,4 @@ def _of_another(known: Explained, one: Problem, other: Problem) -> Explained | N
 
     changes, others = tuple(map(named, e.changes)), tuple(tuple(map(named, slot)) for slot in e.equivalents)
     before = discrepancy(State.start(other))
-    return Explained(replace(e, changes=changes, equivalents=others, before=before, after=left))
+    return Explained(replace(e, changes=changes, equivalents=others, before=before, after=residual))

@@ -129,9 +129,9 @@ def test_nothing_is_claimed_of_what_no_repair_explains(models: dict[str, RobotMo
 
 
 def test_unexplained_says_so(models: dict[str, RobotModel]) -> None:
-    from harness.run.explaining import told  # noqa: PLC0415
+    from harness.run.explaining import explained  # noqa: PLC0415
 
-    outcome = told(bound_problem(models["ur5"], Clamps(models["ur5"].table)), models["ur5"])
+    outcome = explained(bound_problem(models["ur5"], Clamps(models["ur5"].table)), models["ur5"])
     assert outcome.explanation is None
     assert "dh:clamps does not move as a serial chain" in outcome.unexplained
 
