@@ -88,7 +88,7 @@ def _show(result: Difference) -> None:
         return
     table = bare_table(header[0])
     for column in header[1:]:
-        table.add_column(column, justify="right")
+        table.add_column(Text(column), justify="right")  # [mm] is a unit, not markup
     for row in rows:
         table.add_row(*(Text(cell.text, style=STYLES[cell.kind]) for cell in row))
     out.print(table)

@@ -145,8 +145,8 @@ class RunSettings:
 def run(settings: RunSettings) -> int:
     """Cross-check robot models (names, or folders with a model.toml; none: all) and write reports.
 
-    Exit code: 0 all agree, 1 a disagreement, 2 wrong input, 3 a required source is missing or failed; with several of
-    these, the smallest.
+    Exit code: 0 all agree, 1 a disagreement, 2 wrong input, 3 a required source is missing or failed. If several apply,
+    the smallest code wins: a missing source never hides a disagreement.
     """
     options = settings.options()
     folders = folders_of(settings.robots, settings.models or default_models_dir())
