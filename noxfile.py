@@ -1,12 +1,18 @@
 """Every step of CI, to be run at home.
 
-`nox -s crosscheck`, `tests`, `browser`, `mutate`, `engines`, `cpp`, `matrix`, `lint`, `types`, `bench`.
+`nox -s crosscheck`, `tests`, `browser`, `mutate`, `engines`, `cpp`, `matrix`, `lint`, `types`, `bench`, `audit`, `lock`.
+
+What a session installs is in a lock file of its own, `locks/SESSION.txt`, with the hash of every file; `nox -s lock` writes
+them anew from pyproject.toml and constraints.txt. torch is the exception: its CPU build may be a file of this machine.
 """
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -23,6 +29,39 @@ PYTHONS = ("3.10", "3.11", "3.12", "3.13")
 WITH_TORCH = "3.11"  # the Python that constraints.txt has a CPU build of torch for
 
 CONSTRAINTS = "--constraint=constraints.txt"
+LOCKED_PYTHON = (3, 11)  # the lock files are for this one; other Pythons install by constraints.txt
+WITHOUT_HASH = "torch"
+BUILD = ["hatchling", "editables"]  # what builds the project, without an environment of its own
+
+PIN = f"pin=={NEWEST_PIN}"
+# What each lock file is made of. `.` is the project with its extras.
+NEEDS = {
+    "nox": ["nox"],
+    "lint": ["ruff"],
+    "types": ["mypy", "nox", "types-psutil", ".[test]"],
+    "crosscheck": [PIN, ".[all]"],
+    "tests": [PIN, ".[all,test]"],
+    "browser": [PIN, ".[pinocchio,yourdfpy,robots,view,browser,test]"],
+    "cpp": [PIN, ".[pinocchio,robots,test]"],
+    "audit": ["pip-audit"],
+}
+
+
+def install(session: nox.Session, lock: str, editable: bool = False) -> None:
+    """Install what a lock file names, by its hashes, then the project; by constraints.txt alone on another Python."""
+    needs, path = NEEDS[lock], Path("locks") / f"{lock}.txt"
+    project = next((need for need in needs if need.startswith(".")), "")
+    flag = ["--editable"] if editable else []
+    if sys.version_info[:2] != LOCKED_PYTHON:
+        others = [need for need in needs if need != project]
+        session.install(CONSTRAINTS, *others, *([*flag, project] if project else []))
+        return
+    text = path.read_text(encoding="utf-8")
+    if local := re.search(rf"^# without a hash: ({WITHOUT_HASH}==\S+)$", text, re.MULTILINE):
+        session.install("--no-deps", local[1])
+    session.install("--no-deps", "--require-hashes", "--requirement", str(path))
+    if project:
+        session.install("--no-deps", "--no-build-isolation", *flag, ".")
 
 
 def found_pythons() -> list[str]:
@@ -44,7 +83,7 @@ def found_pythons() -> list[str]:
 @nox.session
 def crosscheck(session: nox.Session) -> None:
     """Cross-check all robots with all engines, strictly against reports/accepted/; reports go to reports/."""
-    session.install(CONSTRAINTS, f"pin=={NEWEST_PIN}", ".[all]")
+    install(session, "crosscheck")
     # With other arguments the numbers cannot be compared with those on file.
     session.run("crosscheck", "run", "--samples", "10000", "--out", "reports", *(session.posargs or ["--strict"]))
 
@@ -52,21 +91,21 @@ def crosscheck(session: nox.Session) -> None:
 @nox.session
 def tests(session: nox.Session) -> None:
     """The test suite on this Python with the newest pin."""
-    session.install(CONSTRAINTS, f"pin=={NEWEST_PIN}", "--editable", ".[all,test]")
+    install(session, "tests", editable=True)
     session.run("pytest", *session.posargs)
 
 
 @nox.session
 def mutate(session: nox.Session) -> None:
     """How good the gate is: faults put into all robots on purpose, caught or not, and their causes named or not."""
-    session.install(CONSTRAINTS, f"pin=={NEWEST_PIN}", ".[all]")
+    install(session, "crosscheck")
     session.run("crosscheck", "mutate", "--out", "reports", *session.posargs)
 
 
 @nox.session
 def engines(session: nox.Session) -> None:
     """Every engine there is, in its own environment: install them, try each case by case, cross-check all robots."""
-    session.install(CONSTRAINTS, f"pin=={NEWEST_PIN}", "--editable", ".[all,test]")
+    install(session, "tests", editable=True)
     # 3: one could not be installed here. The cases below then fail for it, the table of the run tells why.
     session.run("crosscheck", "engines", "install", "--all", CONSTRAINTS, success_codes=[0, 3])
     session.run("pytest", "-q", "tests/engines/test_engines.py", env={"CROSSCHECK_TESTS_ENGINES": "all"})
@@ -84,14 +123,14 @@ def browser(session: nox.Session) -> None:
     )
     if chromium is None:
         session.error("no Chromium found; install it (Debian: apt install chromium), or say where it is: CHROMIUM=...")
-    session.install(CONSTRAINTS, f"pin=={NEWEST_PIN}", "--editable", ".[pinocchio,yourdfpy,robots,view,browser,test]")
+    install(session, "browser", editable=True)
     session.run("pytest", "tests/browser", *session.posargs, env={"CROSSCHECK_TESTS_BROWSER": str(chromium)})
 
 
 @nox.session
 def cpp(session: nox.Session) -> None:
     """The C++ controller: build it, run its tests, cross-check it. Needs CMake, a C++17 compiler, Eigen and GoogleTest."""
-    session.install(CONSTRAINTS, f"pin=={NEWEST_PIN}", ".[pinocchio,robots,test]")
+    install(session, "cpp")
     build = Path(session.create_tmp()).resolve() / "build"
     source = "examples/cpp_controller"
     session.run("cmake", "-S", source, "-B", str(build), external=True)
@@ -116,7 +155,7 @@ def matrix(session: nox.Session, pin: str) -> None:
 @nox.session
 def lint(session: nox.Session) -> None:
     """Style: ruff's checks and its formatting."""
-    session.install(CONSTRAINTS, "ruff")
+    install(session, "lint")
     session.run("ruff", "check", ".")
     session.run("ruff", "format", "--check", ".")
 
@@ -124,16 +163,68 @@ def lint(session: nox.Session) -> None:
 @nox.session
 def types(session: nox.Session) -> None:
     """Types: mypy, strict."""
-    session.install(CONSTRAINTS, "mypy", "nox", "types-psutil", ".[test]")
+    install(session, "types")
     session.run("mypy")
 
 
 @nox.session
 def bench(session: nox.Session) -> None:
     """Speed and memory as ratios within one run, the start, 10 000 random certificates, derive-dh on every packaged chain."""
-    session.install(CONSTRAINTS, f"pin=={NEWEST_PIN}", ".[all,test]")
+    install(session, "tests")
     session.run("python", "bench/bench.py")
     session.run("python", "bench/startup.py")
     session.run("python", "bench/engines.py")
     session.run("python", "bench/soundness.py", *(session.posargs or ["10000"]))
     session.run("python", "bench/derive_all.py")
+
+
+@nox.session
+def audit(session: nox.Session) -> None:
+    """Known vulnerabilities in what the lock files name. Without the database nothing is audited, and that is said.
+
+    AUDIT=required makes that a failure: for a machine that must reach it.
+    """
+    install(session, "audit")
+    for path in sorted(Path("locks").glob("*.txt")):
+        done = subprocess.run(
+            ["pip-audit", "--require-hashes", "--disable-pip", "--requirement", str(path)],
+            env={**os.environ, "PATH": os.pathsep.join([*(session.bin_paths or []), os.environ["PATH"]])},
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        output = done.stdout + done.stderr
+        # A package that is not found in the database was not audited, whatever the summary says.
+        if re.search(r"could not be audited|ConnectionError|ServiceError|Max retries|timed out|SSLError|ProxyError", output):
+            text = f"the database of vulnerabilities cannot be reached: {path} and those after it were not audited"
+            if os.environ.get("AUDIT") == "required":
+                session.error(text)
+            session.skip(text)
+        session.log(f"{path}: {output.strip()}")
+        if done.returncode:
+            session.error(f"{path} names packages with known vulnerabilities")
+
+
+@nox.session
+def lock(session: nox.Session) -> None:
+    """Write the lock files anew: versions as pip chooses them under constraints.txt, hashes of all their files."""
+    if sys.version_info[:2] != LOCKED_PYTHON:
+        session.error(f"lock files are made by Python {'.'.join(map(str, LOCKED_PYTHON))}")
+    session.install("uv")
+    folder = Path(session.create_tmp()).resolve()
+    chosen = session.posargs or list(NEEDS)
+    for name in chosen:
+        report, pinned = folder / "report.json", folder / f"{name}.in"
+        needs = [*NEEDS[name], *(BUILD if any(need.startswith(".") for need in NEEDS[name]) else [])]
+        session.run("pip", "install", "--dry-run", "--ignore-installed", "--quiet", "--report", str(report), CONSTRAINTS, *needs)
+        packages = [entry["metadata"] for entry in json.loads(report.read_text())["install"]]
+        lines = sorted(f"{p['name'].lower()}=={p['version']}" for p in packages if p["name"] != "fk-crosscheck")
+        local = [line for line in lines if line.startswith(f"{WITHOUT_HASH}==")]
+        pinned.write_text("\n".join(line for line in lines if line not in local) + "\n")
+        options = ["--no-deps", "--generate-hashes", "--no-header", "--no-annotate", "--quiet", "--python-version", "3.11"]
+        session.run("uv", "pip", "compile", *options, "--output-file", str(folder / "out.txt"), str(pinned), silent=True)
+        # A build of this machine, 2.13.0+cpu, is any 2.13.0 elsewhere.
+        exempt = "".join(f"# without a hash: {line.partition('+')[0]}\n" for line in local)
+        head = f"# Written by `nox -s lock`; not to be edited.\n{exempt}"
+        path = Path("locks") / f"{name}.txt"
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(head + (folder / "out.txt").read_text())
+        session.log(f"{path}: {len(lines)} packages")
