@@ -7,11 +7,11 @@ from typing import Any
 
 import click
 
-from harness import __version__
 from harness.cli.error_line import complain
 from harness.cli.lazy import LazyGroup, Place
 from harness.errors import CrosscheckError
 from harness.report.text import plain
+from harness.version import __version__
 
 # The first sentence of each command's docstring stands here too: `crosscheck --help` imports none of the commands.
 COMMANDS = {

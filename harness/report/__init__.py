@@ -1,1 +1,1 @@
-"""Telling it: JSON, HTML, Markdown, JUnit. Knows only the report document."""
+"""The report document: its types, the words that every format shares, JSON."""

@@ -6,7 +6,7 @@ import platform
 from dataclasses import dataclass
 from datetime import datetime, timezone
 
-from harness import __version__, se3
+from harness import se3
 from harness.description.configurations import Configuration
 from harness.description.published import Published
 from harness.report import document as doc
@@ -16,6 +16,7 @@ from harness.verdict.gate import gate, held_to
 from harness.verdict.judge import check_claim
 from harness.verdict.model_part import side_by_side, trees
 from harness.verdict.source_part import assemble_source
+from harness.version import __version__
 
 
 @dataclass(frozen=True, kw_only=True)
