@@ -146,7 +146,7 @@ def test_index_lists_every_report_in_the_folder(reports: dict[str, Report], disa
     assert "All 2 robots agree" in text
     write_report(disagreeing, tmp_path)
     page = lxml_html.fromstring(write_index(tmp_path).read_text())
-    assert "1 of 3 robots do not agree: ur5" in page.text_content()
+    assert "1 of 3 robots do not pass: ur5" in page.text_content()
     assert [a.get("href") for a in page.iter("a")] == ["sixr.html", "stanford.html", "ur5.html"]
     assert {"robot", "verdict", "since accepted"} <= {b.text for b in page.iter("button")}
     assert json.loads((tmp_path / "report.schema.json").read_text()) == json.loads(json.dumps(schema()))
