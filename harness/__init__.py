@@ -17,7 +17,6 @@ if TYPE_CHECKING:
         crosscheck,
         derive_dh,
         diff,
-        forward_kinematics,
         identify,
         load_model,
         read_report,
@@ -28,14 +27,15 @@ if TYPE_CHECKING:
     from harness.description.model import RobotModel
     from harness.difference.identify import Identification
     from harness.difference.result import Difference
-    from harness.errors import CrosscheckError, EngineFailed, EngineUnavailable, InputError
+    from harness.engines.forward import forward_kinematics
+    from harness.errors import CrosscheckError, DescriptionUnavailable, EngineFailed, EngineUnavailable, InputError
     from harness.report.document import Report
     from harness.run.options import Options
     from harness.workers.process import Limits
 
 _HOME = {
     **dict.fromkeys(
-        ("Session", "crosscheck", "derive_dh", "diff", "forward_kinematics", "identify", "load_model", "read_report",
+        ("Session", "crosscheck", "derive_dh", "diff", "identify", "load_model", "read_report",
          "write_report"),
         "harness.api",
     ),
@@ -44,7 +44,10 @@ _HOME = {
     "RobotModel": "harness.description.model",
     "Identification": "harness.difference.identify",
     "Difference": "harness.difference.result",
-    **dict.fromkeys(("CrosscheckError", "EngineFailed", "EngineUnavailable", "InputError"), "harness.errors"),
+    "forward_kinematics": "harness.engines.forward",
+    **dict.fromkeys(
+        ("CrosscheckError", "DescriptionUnavailable", "EngineFailed", "EngineUnavailable", "InputError"), "harness.errors"
+    ),
     "Report": "harness.report.document",
     "Options": "harness.run.options",
     "Limits": "harness.workers.process",
@@ -55,6 +58,7 @@ __all__ = [
     "DHRow",
     "DHTable",
     "Derived",
+    "DescriptionUnavailable",
     "Difference",
     "EngineFailed",
     "EngineUnavailable",
@@ -85,4 +89,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted([*__all__, "__version__"])

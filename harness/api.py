@@ -5,30 +5,26 @@ Every function raises the errors of `harness.errors`, with their facts as fields
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import TypeAlias, TypeVar
 
-import numpy as np
-from numpy.typing import ArrayLike
-
 from harness.convert.derive import derive
 from harness.convert.result import Derived
-from harness.description.dh import Convention, DHTable
+from harness.description.dh import Convention, DHTable, check_convention
 from harness.description.locate import default_models_dir, find_model
 from harness.description.model import RobotModel
 from harness.description.model import load_model as load_folder
 from harness.description.urdf import Urdf
-from harness.description.urdf_file import parse_urdf, read_urdf
 from harness.description.urdf_lint import check
 from harness.difference import differences
 from harness.difference import identify as identifying
 from harness.difference.operands import Operand, named_after, only_leaf
-from harness.difference.reading import Description, Ends, operand_of
+from harness.difference.reading import Description, Ends, operand_of, urdf_named
 from harness.difference.result import Difference
-from harness.engines.dh_numpy import DHNumpy
 from harness.engines.registry import REFERENCE
 from harness.errors import InputError
 from harness.rendering import files
@@ -36,7 +32,6 @@ from harness.report.document import Report
 from harness.report.json_file import read_report as read_document
 from harness.run.options import Options
 from harness.run.streaming import Progress
-from harness.se3 import Array
 from harness.verdict import crosscheck as verdict
 from harness.verdict.accepted import AcceptedNumbers, read_accepted
 
@@ -54,14 +49,21 @@ def load_model(robot: str | Path, *, models: str | Path | None = None) -> RobotM
     """
     if isinstance(robot, Path):
         return load_folder(robot)
+    _check_text(robot, "a name or a folder")
     return load_folder(find_model(robot, Path(models or default_models_dir())))
+
+
+def _check_text(value: object, expected: str) -> None:
+    """Raise InputError for what is neither text nor a path."""
+    if not isinstance(value, str | Path):
+        raise InputError(f"expected {expected}, got {type(value).__name__}")
 
 
 class Session:
     """Cross-checks one robot after the other and keeps the engines running in between: `with Session(options) as session:`."""
 
     def __init__(self, options: Options | None = None) -> None:
-        self.options = options or Options()
+        self.options = _options(options)
         self._pool = self.options.worker_pool()
 
     def __enter__(self) -> Session:
@@ -87,6 +89,13 @@ class Session:
         return verdict.crosscheck(model, options, progress, self._pool, _on_file(model, options))
 
 
+def _options(given: Options | None) -> Options:
+    """The options, or those that nothing was said of. Raises InputError for another type."""
+    if given is not None and not isinstance(given, Options):
+        raise InputError(f"expected harness.Options, got {type(given).__name__}", key="options")
+    return given or Options()
+
+
 def _on_file(model: RobotModel, options: Options) -> AcceptedNumbers | None:
     """The accepted numbers, before any work is done. Raises InputError if they are wrong, or not there in a strict run."""
     if options.accepted is None:
@@ -100,7 +109,7 @@ def _on_file(model: RobotModel, options: Options) -> AcceptedNumbers | None:
 def crosscheck(
     model: RobotModel | str | Path,
     *,
-    sources: Sequence[str] = (),
+    sources: str | Sequence[str] = (),
     samples: int = Options.samples,
     seed: int = Options.seed,
     reference: str = REFERENCE,
@@ -111,7 +120,7 @@ def crosscheck(
     """Cross-check a robot model: its DH table against its URDF in every source, at every mapped frame.
 
     model: a `RobotModel`, a name that comes with the package, or a folder.
-    sources: the sources to compare, such as `urdf:pinocchio`; empty: those of model.toml.
+    sources: the sources to compare, such as `urdf:pinocchio`, one or several; empty: those of model.toml.
     samples: random configurations, besides the fixed ones.
     seed: their seed.
     reference: the source that the others are compared with.
@@ -122,8 +131,8 @@ def crosscheck(
     Raises InputError for wrong input. A missing or failing engine is part of the report.
     """
     asked = replace(
-        options or Options(),
-        sources=tuple(sources),
+        _options(options),
+        sources=(sources,) if isinstance(sources, str) else tuple(sources),
         samples=samples,
         seed=seed,
         reference=reference,
@@ -155,6 +164,8 @@ def diff(
 
     Raises InputError if one cannot be read, or if they do not have the same number and kinds of joints.
     """
+    if not (math.isfinite(tolerance) and tolerance > 0.0):
+        raise InputError(f"expected a tolerance above 0 and finite, got {tolerance!r}", key="tolerance")
     folder = Path(models or default_models_dir())
     bases, tips = _each(base), _each(tip)
     conventions: tuple[Convention, Convention] = _each(convention)
@@ -210,49 +221,32 @@ def derive_dh(
 ) -> Derived:
     """The DH table of a chain in a URDF, from its placements alone.
 
-    urdf: a path, the text of a URDF, or a `Urdf`.
+    urdf: a path, `PACKAGE:FILE.urdf`, the text of a URDF, or a `Urdf`.
     base, tip: links the chain runs between; None: the root, the only leaf.
     convention: DH convention of the table.
     source: the engine whose placements are believed.
 
     Raises InputError (among them UrdfError if there is no such table) or EngineUnavailable.
     """
-    if isinstance(urdf, str) and urdf.lstrip().startswith("<"):
-        read = parse_urdf(urdf.encode(), Path("text"))
+    check_convention(convention)
+    if isinstance(urdf, Urdf):
+        read = urdf
     else:
-        read = urdf if isinstance(urdf, Urdf) else read_urdf(Path(urdf))
+        _check_text(urdf, "a path, PACKAGE:FILE.urdf, the text of a URDF or a Urdf")
+        read = urdf_named(str(urdf))
     check(read)
     return derive(read, base or read.roots[0], tip or only_leaf(read), convention, source)
 
 
-def forward_kinematics(table: DHTable, q: ArrayLike, frames: Sequence[str] | None = None) -> Array:
-    """Placements of a DH table, in its base frame.
-
-    table: the DH table.
-    q: joint values (n,) or (N, n), in the order of `table.joints` [rad or m].
-    frames: labels out of `table.frames`; None: the tool frame alone.
-
-    Returns (4, 4) or (N, 4, 4) for the tool frame, (F, 4, 4) or (N, F, 4, 4) for named frames [m].
-    Raises InputError for a `q` of another shape, or a frame that the table does not have.
-    """
-    values, engine = np.asarray(q, dtype=np.float64), DHNumpy(table)
-    n = len(table.joints)
-    if values.ndim not in (1, 2) or values.shape[-1] != n:
-        raise InputError(f"expected q of shape ({n},) or (N, {n}), for the joints {', '.join(table.joints)}; got {values.shape}")
-    for frame in frames or ():
-        if frame not in table.frames:
-            raise InputError(f"no DH frame {frame!r}", hint=f"one of {', '.join(table.frames)}")
-    placed = engine.placements(np.atleast_2d(values), tuple(frames) if frames is not None else ("tool",))
-    placed = placed if frames is not None else placed[:, 0]
-    return placed[0] if values.ndim == 1 else placed
-
-
 def read_report(path: str | Path) -> Report:
     """Read a report's JSON. Raises InputError if it is none, or one of another version."""
+    _check_text(path, "the path of a report's JSON")
     return read_document(Path(path))
 
 
 def write_report(report: Report, folder: str | Path) -> list[Path]:
     """Write JSON, HTML, Markdown and JUnit of a report into a folder, which is made. Raises InputError."""
+    if not isinstance(report, Report):
+        raise InputError(f"expected a Report, got {type(report).__name__}")
     files.prepare(Path(folder))
     return files.write_report(report, Path(folder))

@@ -49,7 +49,7 @@ class InputError(CrosscheckError, ValueError):
         self.line = line
         self.key = key
         self.hint = hint
-        place = self.where or ""
+        place = " ".join((self.where or "").split("\n"))
         if line is not None:
             place = f"{place}:{line}" if place else f"line {line}"
         if key is not None:

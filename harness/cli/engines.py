@@ -45,7 +45,8 @@ def install_command(names: tuple[str, ...], everything: bool, constraint: Path |
             missing += 1
     done = install(adapters, constraint.resolve() if constraint else None, _say)
     missing += sum(bool(entry.problem) for entry in done.values())
-    _say(f"{len(done) - missing} of {len(done)} engines installed; environments in {cache_folder()}")
+    asked = len(registered() if everything else names)
+    _say(f"{asked - missing} of {asked} engines installed; environments in {cache_folder()}")
     return 3 if missing else 0
 
 

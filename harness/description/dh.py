@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
 from harness import se3
-from harness.errors import nearest
+from harness.errors import InputError, nearest
 
 Convention: TypeAlias = Literal["standard", "modified"]
 Kind: TypeAlias = Literal["revolute", "prismatic", "fixed"]
@@ -59,6 +59,12 @@ class DHRow:
         return cls(name=name, kind=kind, a=a, alpha=alpha, d=d, theta=theta)
 
 
+def check_convention(convention: object) -> None:
+    """Raise InputError unless it is `standard` or `modified`."""
+    if convention not in get_args(Convention):
+        raise InputError(f"expected 'standard' or 'modified', got {convention!r}", key="convention")
+
+
 @dataclass(frozen=True)
 class DHTable:
     """A serial chain in DH parameters.
@@ -77,6 +83,10 @@ class DHTable:
     convention: Convention = "standard"
     base: se3.Array = field(default_factory=lambda: np.eye(4))
     tool: se3.Array = field(default_factory=lambda: np.eye(4))
+
+    def __post_init__(self) -> None:
+        """Refuse another convention: it would be taken for one of the two. Raises InputError."""
+        check_convention(self.convention)
 
     @property
     def joints(self) -> tuple[str, ...]:

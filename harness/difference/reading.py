@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from harness.description.dh import Convention, DHRow, DHTable
+from harness.description.dh import Convention, DHRow, DHTable, check_convention
 from harness.description.dh_csv import parse_dh_csv, read_dh_csv
 from harness.description.locate import find_model, packaged_file
 from harness.description.model import RobotModel, load_model, load_table
@@ -37,6 +37,10 @@ class Ends:
     tip: str | None = None
     convention: Convention = "standard"
 
+    def __post_init__(self) -> None:
+        """Refuse what is neither convention. Raises InputError."""
+        check_convention(self.convention)
+
 
 def read_operand(text: str, models: Path, ends: Ends) -> Operand:
     """A robot model's name or folder, `roboticstoolbox:NAME`, FILE.csv, FILE.urdf, or PACKAGE:FILE.urdf.
@@ -45,9 +49,8 @@ def read_operand(text: str, models: Path, ends: Ends) -> Operand:
     """
     if text.startswith(TOOLBOX):
         return of_table(packaged_table(text.removeprefix(TOOLBOX)), text)
-    package, colon, file = text.partition(":")
-    if colon and not Path(text).exists():
-        return of_urdf(read_urdf(packaged_file(package, file)), ends.base, ends.tip)
+    if is_packaged(text):
+        return of_urdf(urdf_named(text), ends.base, ends.tip)
     path = Path(text)
     if path.suffix.lower() == ".csv":
         rows, _ = read_dh_csv(path)
@@ -61,6 +64,23 @@ def read_operand(text: str, models: Path, ends: Ends) -> Operand:
         model_file, table, _ = load_table(folder)
         return of_table(table, model_file.name)
     return of_table(model.table, model.name)
+
+
+def is_packaged(text: str) -> bool:
+    """Whether it names a file of an installed package, as PACKAGE:FILE.urdf does."""
+    return ":" in text and not Path(text).exists()
+
+
+def urdf_named(text: str) -> Urdf:
+    """The URDF of a path, of PACKAGE:FILE.urdf, or the text itself. Raises InputError and its kind."""
+    if text.lstrip().startswith("<"):
+        return parse_urdf(text.encode(), Path("text"))
+    if is_packaged(text):
+        package, _, file = text.partition(":")
+        if not package or not file:
+            raise InputError(f"expected PACKAGE:FILE.urdf, got {text!r}")
+        return read_urdf(packaged_file(package, file))
+    return read_urdf(Path(text))
 
 
 def operand_of(description: Description, name: str, models: Path, ends: Ends) -> Operand:
@@ -104,6 +124,11 @@ def _rows(values: ArrayLike, name: str) -> tuple[DHRow, ...]:
     except (TypeError, ValueError):
         kind = type(values).__name__
         raise InputError(f"expected a name, a path, text, a DHTable or rows of numbers, got {kind}", where=name) from None
+    if np.iscomplexobj(values):
+        raise InputError("expected real numbers, got complex ones", where=name)
+    if numbers.ndim == 0:
+        kind = type(values).__name__
+        raise InputError(f"expected a name, a path, text, a DHTable or rows of numbers, got {kind}", where=name)
     if numbers.ndim != 2 or numbers.shape[1] != 4 or not len(numbers):
         raise InputError(f"expected rows of a, alpha, d, theta, shape (n, 4), got shape {numbers.shape}", where=name)
     if not np.isfinite(numbers).all():

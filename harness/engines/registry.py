@@ -9,7 +9,7 @@ from importlib import metadata
 from harness.description.model import RobotModel
 from harness.description.packaged import Packaged
 from harness.description.urdf import UrdfText
-from harness.engines.base import Description, Engine
+from harness.engines.base import Description, Engine, Trait
 from harness.errors import DescriptionUnavailable, EngineUnavailable, InputError, nearest
 
 GROUP = "fk_crosscheck.engines"
@@ -44,6 +44,7 @@ def registered() -> dict[str, Registered]:
             adapter = point.load()
             if not (isinstance(adapter, type) and issubclass(adapter, Engine)):
                 raise TypeError(f"{point.value} is not a subclass of harness.engines.base.Engine")
+            _check_class(adapter)
             entry = Registered(adapter.source, adapter)
         except Exception as error:  # third-party code: whatever it raises must not end the run
             entry = Registered(source, None, f"entry point {point.value}: {type(error).__name__}: {error}")
@@ -51,6 +52,19 @@ def registered() -> dict[str, Registered]:
             entry = Registered(entry.name, None, f"two packages offer {entry.name}: second is {point.value}")
         engines[entry.name] = entry
     return dict(sorted(engines.items(), key=lambda item: (item[0] != REFERENCE, item[0])))
+
+
+def _check_class(adapter: type[Engine]) -> None:
+    """Raise TypeError for what a third party's class says of itself in another form than the harness reads."""
+    source = getattr(adapter, "source", None)
+    if not isinstance(source, str) or not source.startswith(("dh:", "urdf:")):
+        raise TypeError(f"source: expected dh:NAME or urdf:NAME, got {source!r}")
+    for name in ("requirements", "debian", "imports"):
+        value = getattr(adapter, name)
+        if not isinstance(value, tuple) or not all(isinstance(text, str) for text in value):
+            raise TypeError(f'{name}: expected a tuple of texts such as ("numpy>=1.26",), got {value!r}')
+    if not isinstance(adapter.traits, tuple) or not all(isinstance(trait, Trait) for trait in adapter.traits):
+        raise TypeError(f"traits: expected a tuple of Trait, got {adapter.traits!r}")
 
 
 def adapter_of(source: str) -> type[Engine]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from numbers import Integral
 from pathlib import Path
 
 from harness.engines.registry import REFERENCE
@@ -57,7 +58,23 @@ class Options:
         return Workers(self.limits, self.jobs, self.in_process)
 
     def __post_init__(self) -> None:
-        """Refuse impossible numbers. Raises InputError."""
+        """Refuse impossible values. Raises InputError."""
+        if self.accepted is not None:
+            if not isinstance(self.accepted, str | Path):
+                raise InputError(f"expected a folder, got {self.accepted!r}", key="accepted")
+            object.__setattr__(self, "accepted", Path(self.accepted))
+        for name in ("samples", "seed", "jobs"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, Integral):
+                raise InputError(f"expected a whole number, got {value!r}", key=name)
+            object.__setattr__(self, name, int(value))
+        for name in ("certify", "explain", "all_engines", "in_process", "strict"):
+            if not isinstance(value := getattr(self, name), bool):
+                raise InputError(f"expected True or False, got {value!r}", key=name)
+        if not isinstance(self.limits, Limits):
+            raise InputError(f"expected harness.Limits, got {self.limits!r}", key="limits")
+        if not isinstance(self.sources, tuple) or not all(isinstance(source, str) for source in self.sources):
+            raise InputError(f"expected a tuple of source names, got {self.sources!r}", key="sources")
         if self.samples < 0:
             raise InputError(f"expected samples >= 0, got {self.samples}")
         if not 0 <= self.seed < 2**64:

@@ -434,3 +434,23 @@ class _WrongShape(Engine):
 def test_a_result_of_the_wrong_shape_or_type(result: Array) -> None:
     with pytest.raises(EngineFailed, match=r"expected placements float64 \(2, 1, 4, 4\)"):
         _WrongShape(result).placements(np.zeros((2, 1)), ["f"])
+
+
+@pytest.mark.parametrize(
+    ("body", "problem"),
+    [
+        ("requirements = ('acme-fk>=2')", r"requirements: expected a tuple of texts"),
+        ("traits = ('drops links',)", "traits: expected a tuple of Trait"),
+        ("source = 'acme:fk'", "source: expected dh:NAME or urdf:NAME, got 'acme:fk'"),
+        ("source = None", "source: expected dh:NAME or urdf:NAME, got None"),
+    ],
+)
+def test_what_a_class_says_of_itself_is_checked(body: str, problem: str) -> None:
+    """A slip in a third party's class must not end the list of all engines."""
+    from harness.engines.registry import _check_class  # noqa: PLC0415
+
+    namespace = {"source": "urdf:acme"}
+    exec(body, {}, namespace)
+    adapter = type("Acme", (_Broken,), namespace)
+    with pytest.raises(TypeError, match=problem):
+        _check_class(adapter)
