@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from harness.cli.console import console
+from harness.cli.output import Kept
 from harness.cli.shared import complete_robots, complete_sources, folders_of, models_option, progress_bar
 from harness.description.locate import default_models_dir
 from harness.errors import InputError
@@ -50,4 +51,4 @@ def mutate(
         total = result.total
         counts = f"{total.caught} caught, {total.missed} missed, {total.false_alarms} false alarms in {result.seconds:.0f} s"
         console().print(f"{counts}; written to {plain(str(out / 'mutation.json'))}", markup=False)
-    return result.exit_code
+    return Kept(result.exit_code)
