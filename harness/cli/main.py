@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from typing import Any
 
 import click
 
@@ -71,7 +72,26 @@ COMMANDS = {
 }  # fmt: skip
 
 
-@click.group(cls=LazyGroup, places=COMMANDS, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+class _Carried(Exception):
+    """Carries an exception past click, which has an answer of its own to it."""
+
+    def __init__(self, error: BaseException) -> None:
+        super().__init__()
+        self.error = error
+
+
+class _Group(LazyGroup):
+    """A group that lets nothing but its own exceptions reach click."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command. A broken pipe would end with 1, which is a disagreement; an end of file as if by Ctrl-C."""
+        try:
+            return super().invoke(ctx)
+        except (BrokenPipeError, EOFError) as error:
+            raise _Carried(error) from None
+
+
+@click.group(cls=_Group, places=COMMANDS, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="crosscheck")
 def cli() -> None:
     """Cross-validate a robot's DH table against its URDF with every FK engine installed."""
@@ -103,13 +123,9 @@ def _called() -> object:
     except click.ClickException as error:
         complain(InputError(error.format_message()))
         return ExitCode.WRONG_INPUT
-    except click.Abort as error:
-        if isinstance(error.__cause__, EOFError):  # click takes it for an answer that the user refused
-            raise error.__cause__ from None
-        raise
+    except _Carried as carried:
+        raise carried.error from None
     except SystemExit as error:
-        if isinstance(error.__context__, OSError):  # a broken pipe of ours, which click takes for that of the reader
-            raise error.__context__ from None
         if "_CROSSCHECK_COMPLETE" not in os.environ:
             raise
         return ExitCode.WRONG_INPUT if error.code else ExitCode.AGREES

@@ -15,6 +15,7 @@ from harness.mutation.run import SOURCES, run_mutants
 from harness.mutation.score import show
 from harness.rendering.files import prepare, write
 from harness.report.text import plain
+from harness.run.options import MOST_JOBS
 
 
 @click.command()
@@ -25,7 +26,7 @@ from harness.report.text import plain
     help="Source that is to catch the mutants; repeat for more.",
 )  # fmt: skip
 @click.option("--every", type=click.IntRange(min=1), default=1, show_default=True, help="Try only each so manieth mutant.")
-@click.option("--jobs", type=click.IntRange(min=0), default=0, help="Processes.  [default: one a core]")
+@click.option("--jobs", type=click.IntRange(min=0, max=MOST_JOBS), default=0, help="Processes.  [default: one a core]")
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("reports"), show_default=True, help="Folder for mutation.json."
 )

@@ -15,6 +15,7 @@ from harness.cli.console import console
 from harness.cli.crash import attempt
 from harness.cli.output import Kept, json_line
 from harness.cli.shared import (
+    Quantity,
     accepted_option,
     complete_robots,
     complete_sources,
@@ -22,6 +23,7 @@ from harness.cli.shared import (
     gathered,
     models_option,
     progress_bar,
+    seconds,
 )
 from harness.description.locate import default_models_dir
 from harness.engines.registry import REFERENCE
@@ -138,9 +140,9 @@ class RunSettings:
 @accepted_option
 @click.option("--strict", is_flag=True, help="Fail if a discrepancy grew since it was accepted, by more than the noise floor.")
 @click.option("--jobs", type=int, default=0, help="Engines that compute at a time.  [default: one a core]")
-@click.option("--start-timeout", type=float, default=Limits.start, show_default=True, help="Seconds for an engine to start.")
-@click.option("--block-timeout", type=float, default=Limits.block, show_default=True, help="Seconds for 4096 configurations.")
-@click.option("--memory-limit", type=float, default=Limits.memory / 2**30, show_default=True, help="GiB for each engine.")
+@click.option("--start-timeout", type=seconds, default=Limits.start, show_default=True, help="Seconds for an engine to start.")
+@click.option("--block-timeout", type=seconds, default=Limits.block, show_default=True, help="Seconds for 4096 configurations.")
+@click.option("--memory-limit", type=Quantity(1e9), default=Limits.memory / 2**30, show_default=True, help="GiB for each engine.")
 @click.option("--in-process", is_flag=True, help="Run the engines in this process, for debugging: no limits hold.")
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing but errors; the exit code tells.")
 @click.option("--json", "as_json", is_flag=True, help="Print each report as one line of JSON.")
