@@ -2,17 +2,35 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
+from types import FrameType
+
+INTERRUPTED = 130
 
 
 def main() -> None:
     """Entry point."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else the caller wants it ignored
+        signal.signal(signal.SIGINT, _interrupt)
     try:
         from harness.cli.main import main as command  # noqa: PLC0415
-    except KeyboardInterrupt:
+
+        command()
+    except KeyboardInterrupt:  # before the command could answer it
         sys.stderr.write("interrupted: reports written before are unchanged\n")
-        sys.exit(130)
-    command()
+        sys.exit(INTERRUPTED)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    """The first Ctrl-C: clean up. Another one ends the process at once, and the warden then ends the workers."""
+    signal.signal(signal.SIGINT, _end)
+    raise KeyboardInterrupt
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    os._exit(INTERRUPTED)
 
 
 if __name__ == "__main__":

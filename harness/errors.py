@@ -19,6 +19,7 @@ class ExitCode(IntEnum):
     DISAGREES = 1
     WRONG_INPUT = 2
     NOT_VERIFIED = 3  # a required source is missing or failed
+    INTERNAL = 70  # a fault of the harness: an exception that nobody foresaw
     INTERRUPTED = 130
     PIPE_CLOSED = 141
 

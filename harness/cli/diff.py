@@ -12,8 +12,9 @@ from rich.text import Text
 
 from harness.api import diff
 from harness.cli.console import console
-from harness.cli.shared import complete_robots, gathered, models_option
+from harness.cli.shared import Quantity, complete_robots, gathered, models_option
 from harness.description.dh import Convention
+from harness.description.values import LARGEST_ANGLE
 from harness.difference.result import Difference, Line
 from harness.errors import InputError
 from harness.rendering.tables import bare_table
@@ -47,7 +48,7 @@ class DiffSettings:
     "--convention", "conventions", multiple=True, type=click.Choice(["standard", "modified"]),
     help="DH convention of a CSV, likewise.  [default: standard]",
 )  # fmt: skip
-@click.option("--tolerance", type=click.FloatRange(min=0, min_open=True), default=1e-6, show_default=True, help="In m and rad.")
+@click.option("--tolerance", type=Quantity(LARGEST_ANGLE), default=1e-6, show_default=True, help="In m and rad.")
 @gathered(DiffSettings, "settings")
 def diff_command(a: str, b: str, models: Path | None, settings: DiffSettings) -> int:
     """Compare two mechanisms from base to tip, and say why they differ.

@@ -20,7 +20,7 @@ def export_urdf_command(robot: str, models: Path | None, out: Path | None) -> in
     """Write a robot model's DH table as a URDF: kinematics only, one link for each DH frame."""
     text = export_urdf(api.load_model(robot, models=models))
     if out is None:
-        click.echo(text, nl=False)
+        click.echo(text.encode(), nl=False)  # XML without a declaration is UTF-8, whatever the terminal is
     else:
         write(out, text)
     return 0

@@ -1,16 +1,18 @@
-"""The command `crosscheck`. Exit codes: 0 agreement, 1 disagreement, 2 wrong input, 3 a required source missing, 130 Ctrl-C."""
+"""The command `crosscheck`. What its exit codes mean stands in `harness.errors.ExitCode`."""
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import Any
 
 import click
 
+from harness.cli.crash import ThreadFaults, attempt
 from harness.cli.error_line import complain
 from harness.cli.lazy import LazyGroup, Place
-from harness.errors import CrosscheckError
-from harness.report.text import plain
+from harness.cli.output import Kept, Outputs
+from harness.errors import ExitCode, InputError
 from harness.version import __version__
 
 # The first sentence of each command's docstring stands here too: `crosscheck --help` imports none of the commands.
@@ -70,26 +72,66 @@ COMMANDS = {
 }  # fmt: skip
 
 
-@click.group(cls=LazyGroup, places=COMMANDS, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+class _Carried(Exception):
+    """Carries an exception past click, which has an answer of its own to it."""
+
+    def __init__(self, error: BaseException) -> None:
+        super().__init__()
+        self.error = error
+
+
+class _Group(LazyGroup):
+    """A group that lets nothing but its own exceptions reach click."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command. A broken pipe would end with 1, which is a disagreement; an end of file as if by Ctrl-C."""
+        try:
+            return super().invoke(ctx)
+        except (BrokenPipeError, EOFError) as error:
+            raise _Carried(error) from None
+
+
+@click.group(cls=_Group, places=COMMANDS, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="crosscheck")
 def cli() -> None:
     """Cross-validate a robot's DH table against its URDF with every FK engine installed."""
 
 
 def main() -> None:
-    """Entry point: every error one line on stderr, no traceback for wrong input."""
+    """Entry point: every error one line on stderr, no traceback. What is lost of the output does not change a verdict."""
+    outputs, threads = Outputs(), ThreadFaults()
     try:
-        code: Any = cli.main(standalone_mode=False)
-    except CrosscheckError as error:
-        complain(error)
-        code = error.exit_code
-    except click.ClickException as error:
-        click.echo(f"error: {plain(error.format_message())}", err=True)
-        code = 2
+        code = attempt(_called)
+        code = code if threads.code == ExitCode.AGREES else _combined(code, threads.code)
+        outputs.flush()
+        if why := outputs.loss():
+            complain(InputError(f"cannot be written: {why}", where="standard output"))
+            code = _combined(code, ExitCode.WRONG_INPUT)
+        elif outputs.unread and code == ExitCode.AGREES and not isinstance(code, Kept):
+            code = ExitCode.PIPE_CLOSED
     except (KeyboardInterrupt, click.Abort):
         click.echo("interrupted: reports written before are unchanged", err=True)
-        code = 130
-    except BrokenPipeError:  # the reader, e.g. head, has gone; nothing more can be said
-        sys.stdout = None
-        code = 141
-    sys.exit(code if isinstance(code, int) else 0)
+        code = ExitCode.INTERRUPTED
+    outputs.flush()
+    sys.exit(int(code))
+
+
+def _called() -> object:
+    """Run the command that was asked for. Returns what it returns; usage errors are told here."""
+    try:
+        return cli.main(standalone_mode=False)
+    except click.ClickException as error:
+        complain(InputError(error.format_message()))
+        return ExitCode.WRONG_INPUT
+    except _Carried as carried:
+        raise carried.error from None
+    except SystemExit as error:
+        if "_CROSSCHECK_COMPLETE" not in os.environ:
+            raise
+        return ExitCode.WRONG_INPUT if error.code else ExitCode.AGREES
+
+
+def _combined(*codes: int) -> int:
+    from harness.verdict.gate import combined  # noqa: PLC0415  (heavy, and seldom needed)
+
+    return combined(codes)

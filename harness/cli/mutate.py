@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from harness.cli.console import console
+from harness.cli.output import Kept
 from harness.cli.shared import complete_robots, complete_sources, folders_of, models_option, progress_bar
 from harness.description.locate import default_models_dir
 from harness.errors import InputError
@@ -14,6 +15,7 @@ from harness.mutation.run import SOURCES, run_mutants
 from harness.mutation.score import show
 from harness.rendering.files import prepare, write
 from harness.report.text import plain
+from harness.run.options import MOST_JOBS
 
 
 @click.command()
@@ -24,7 +26,7 @@ from harness.report.text import plain
     help="Source that is to catch the mutants; repeat for more.",
 )  # fmt: skip
 @click.option("--every", type=click.IntRange(min=1), default=1, show_default=True, help="Try only each so manieth mutant.")
-@click.option("--jobs", type=click.IntRange(min=0), default=0, help="Processes.  [default: one a core]")
+@click.option("--jobs", type=click.IntRange(min=0, max=MOST_JOBS), default=0, help="Processes.  [default: one a core]")
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("reports"), show_default=True, help="Folder for mutation.json."
 )
@@ -50,4 +52,4 @@ def mutate(
         total = result.total
         counts = f"{total.caught} caught, {total.missed} missed, {total.false_alarms} false alarms in {result.seconds:.0f} s"
         console().print(f"{counts}; written to {plain(str(out / 'mutation.json'))}", markup=False)
-    return result.exit_code
+    return Kept(result.exit_code)

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import click
 
 from harness import api
 from harness.cli.console import console
-from harness.cli.error_line import complain
+from harness.cli.crash import attempt
+from harness.cli.output import Kept, json_line
 from harness.cli.shared import (
+    Quantity,
     accepted_option,
     complete_robots,
     complete_sources,
@@ -19,10 +23,11 @@ from harness.cli.shared import (
     gathered,
     models_option,
     progress_bar,
+    seconds,
 )
 from harness.description.locate import default_models_dir
 from harness.engines.registry import REFERENCE
-from harness.errors import CrosscheckError, InputError
+from harness.errors import ExitCode, InputError
 from harness.rendering.engine_table import show_engine_table
 from harness.rendering.files import prepare, write_index, write_report, write_summary
 from harness.rendering.terminal import show
@@ -135,9 +140,9 @@ class RunSettings:
 @accepted_option
 @click.option("--strict", is_flag=True, help="Fail if a discrepancy grew since it was accepted, by more than the noise floor.")
 @click.option("--jobs", type=int, default=0, help="Engines that compute at a time.  [default: one a core]")
-@click.option("--start-timeout", type=float, default=Limits.start, show_default=True, help="Seconds for an engine to start.")
-@click.option("--block-timeout", type=float, default=Limits.block, show_default=True, help="Seconds for 4096 configurations.")
-@click.option("--memory-limit", type=float, default=Limits.memory / 2**30, show_default=True, help="GiB for each engine.")
+@click.option("--start-timeout", type=seconds, default=Limits.start, show_default=True, help="Seconds for an engine to start.")
+@click.option("--block-timeout", type=seconds, default=Limits.block, show_default=True, help="Seconds for 4096 configurations.")
+@click.option("--memory-limit", type=Quantity(1e9), default=Limits.memory / 2**30, show_default=True, help="GiB for each engine.")
 @click.option("--in-process", is_flag=True, help="Run the engines in this process, for debugging: no limits hold.")
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing but errors; the exit code tells.")
 @click.option("--json", "as_json", is_flag=True, help="Print each report as one line of JSON.")
@@ -145,45 +150,69 @@ class RunSettings:
 def run(settings: RunSettings) -> int:
     """Cross-check robot models (names, or folders with a model.toml; none: all) and write reports.
 
-    Exit code: 0 all agree, 1 a disagreement, 2 wrong input, 3 a required source is missing or failed. If several apply,
-    the smallest code wins: a missing source never hides a disagreement.
+    Exit code: 0 all agree, 1 a disagreement, 2 wrong input, 3 a required source is missing or failed, 70 a fault of
+    crosscheck itself. If several apply: 1 before all, then 70, 2, 3. What ends one robot does not end the others.
     """
     options = settings.options()
     folders = folders_of(settings.robots, settings.models or default_models_dir())
     prepare(settings.out)
-    codes: list[int] = []
-    names: dict[str, Path] = {}
-    reports: list[Report] = []
+    tally = Tally()
+    others = [attempt(lambda: _each(folders, options, settings, tally)), attempt(lambda: write_index(settings.out))]
+    if not settings.silent:
+        others.append(attempt(lambda: _show_total(tally, settings)))
+    return Kept(combined([*tally.codes, *others]))
+
+
+@dataclass
+class Tally:
+    """What became of the robots so far.
+
+    names: the folder of each robot name.
+    codes: the exit code of each robot, in order.
+    reports: their reports, as far as there are any.
+    faults: folders of the robots that a fault of the harness ended.
+    """
+
+    names: dict[str, Path] = field(default_factory=dict)
+    codes: list[int] = field(default_factory=list)
+    reports: list[Report] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+
+
+def _each(folders: Sequence[Path], options: Options, settings: RunSettings, tally: Tally) -> None:
+    """Cross-check one robot after the other. What goes wrong with one is told, and ends that one."""
     with api.Session(options) as session:
         for folder in folders:
-            try:
-                reports.append(_checked(session, folder, names, settings))
-                codes.append(reports[-1].verdict.exit_code)
-            except CrosscheckError as error:  # this robot's input is wrong: the others are still checked
-                complain(error)
-                codes.append(error.exit_code)
-    write_index(settings.out)
-    if not settings.silent:
-        if settings.all_engines:
-            show_engine_table(reports, console())
-        where = plain(str(settings.out))
-        console().print(f"{codes.count(0)} of {len(codes)} robots agree; reports in {where}", markup=False)
-    return combined(codes)
+            codes: list[int] = []
+            codes.append(attempt(partial(_one, session, folder, settings, tally, codes), folder.name))
+            tally.codes.append(combined(codes))
+            if ExitCode.INTERNAL in codes:
+                tally.faults.append(folder.name)
 
 
-def _checked(session: api.Session, folder: Path, names: dict[str, Path], settings: RunSettings) -> Report:
-    """Cross-check one robot, write its reports and print its verdict. `names` collects the folder of each robot name."""
+def _one(session: api.Session, folder: Path, settings: RunSettings, tally: Tally, codes: list[int]) -> None:
+    """Cross-check one robot, write its reports and print its verdict. Its verdict goes to `codes` as soon as it is known."""
     model = api.load_model(folder)
-    if model.name in names:
-        raise InputError(f"robot name {model.name!r} is also that of {names[model.name]}", where=folder)
-    names[model.name] = folder
+    if model.name in tally.names:
+        raise InputError(f"robot name {model.name!r} is also that of {tally.names[model.name]}", where=folder)
+    tally.names[model.name] = folder
     command = _command(folder, settings.models, session.options)
     with progress_bar(model.name, settings.silent) as advance:
         report = session.crosscheck(model, progress=advance, options=session.options.reproduced_by(command))
-    write_report(report, settings.out)
-    write_summary(report)
-    _print(report, settings)
-    return report
+    codes.append(report.verdict.exit_code)
+    tally.reports.append(report)
+    for work in (partial(write_report, report, settings.out), partial(write_summary, report), partial(_print, report, settings)):
+        codes.append(attempt(work, folder.name))
+
+
+def _show_total(tally: Tally, settings: RunSettings) -> None:
+    """Print the last line, after the table of the engines if all of them ran."""
+    if settings.all_engines:
+        show_engine_table(tally.reports, console())
+    parts = [f"{tally.codes.count(0)} of {len(tally.codes)} robots agree"]
+    if tally.faults:
+        parts.append(f"{len(tally.faults)} ended by a fault of the harness: {', '.join(tally.faults)}")
+    console().print(plain("; ".join([*parts, f"reports in {settings.out}"])), markup=False)
 
 
 def _command(folder: Path, models: Path | None, options: Options) -> str:
@@ -207,7 +236,7 @@ def _command(folder: Path, models: Path | None, options: Options) -> str:
 
 def _print(report: Report, settings: RunSettings) -> None:
     if settings.as_json:
-        click.echo(report.model_dump_json())
+        click.echo(json_line(report.model_dump_json()))
     elif not settings.quiet:
         out = console()
         show(report, out)

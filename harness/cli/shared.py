@@ -17,11 +17,34 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from harness.cli.console import console
 from harness.description.locate import default_models_dir, find_model, model_folders
+from harness.description.values import parse_number, shown
 from harness.engines.registry import registered
 from harness.report.text import plain
 from harness.verdict.accepted import FOLDER
 
+LONGEST_TIMEOUT = 1e9  # [s], 30 years
+
 Command = Callable[..., int]
+
+
+class Quantity(click.types.FloatParamType):
+    """A number above 0 and within what a description can hold, for an option; its unit stands in the option's help."""
+
+    def __init__(self, largest: float) -> None:
+        self.largest = largest
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Raises click's BadParameter."""
+        try:
+            number = parse_number(value, self.largest)
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+        if number <= 0.0:
+            self.fail(f"expected a number above 0, got {shown(value)}", param, ctx)
+        return number
+
+
+seconds = Quantity(LONGEST_TIMEOUT)
 
 models_option = click.option(
     "--models",

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from harness import api
 from harness.cli.console import console
-from harness.cli.shared import gathered, models_option
+from harness.cli.shared import gathered, models_option, seconds
 from harness.description.frames_file import EngineNames
 from harness.description.model import RobotModel
 from harness.engines.registry import description_of
@@ -42,8 +42,8 @@ class WorkerCheckSettings:
 @click.option("--robot", default="ur5", show_default=True, help="Robot model whose description it is given.")
 @click.option("--name", default="worker", show_default=True, help="Name it goes by; with urdf: in front it is given the URDF.")
 @models_option
-@click.option("--start-timeout", type=float, default=10.0, show_default=True, help="Seconds for its answer to the greeting.")
-@click.option("--block-timeout", type=float, default=30.0, show_default=True, help="Seconds for a block of 4096.")
+@click.option("--start-timeout", type=seconds, default=10.0, show_default=True, help="Seconds for its answer to the greeting.")
+@click.option("--block-timeout", type=seconds, default=30.0, show_default=True, help="Seconds for a block of 4096.")
 @gathered(WorkerCheckSettings, "settings")
 def worker_check(command: tuple[str, ...], settings: WorkerCheckSettings) -> int:
     """Check that a program speaks the worker protocol, and say what is wrong. Exit code 0 if nothing is, else 1."""

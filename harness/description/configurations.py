@@ -17,7 +17,7 @@ from pydantic import Field
 
 from harness.description.dh import DHTable
 from harness.description.published import Published, PublishedEntry
-from harness.description.values import Number, Strict
+from harness.description.values import Name, Number, Strict, Text, checked_angle
 from harness.errors import ModelFileError, nearest
 from harness.se3 import Array
 
@@ -28,17 +28,17 @@ LATTICE_POINTS, LATTICE_GENERATOR = 1021, 267
 class ConfigurationEntry(Strict):
     """One `[[configuration]]`: `q` in the model's joint order; lengths of prismatic joints are metres in either unit."""
 
-    name: str = Field(min_length=1)
+    name: Name = Field(min_length=1)
     unit: Literal["rad", "deg"]
     q: list[Number]
-    provenance: str = ""
+    provenance: Text = ""
     published: list[PublishedEntry] = []
 
 
 class RandomTable(Strict):
     """`[random]`: ranges that replace the URDF limits, [lower, upper] in rad or m for each joint named."""
 
-    limits: dict[str, list[Number]] = {}
+    limits: dict[Name, list[Number]] = {}
 
 
 class ConfigurationsFile(Strict):
@@ -171,9 +171,9 @@ def resolve_configurations(
                     )
         configuration = Configuration(
             entry.name,
-            _radians(entry, table),
+            _radians(entry, table, path, key),
             entry.provenance,
-            tuple(Published.from_entry(claim, entry.unit) for claim in entry.published),
+            tuple(_published(claim, entry.unit, path, f"{key}.published[{j}]") for j, claim in enumerate(entry.published)),
         )
         if entry.name == "zero" and not configuration.q.any():
             fixed[0] = configuration
@@ -186,11 +186,21 @@ def resolve_configurations(
     return ConfigurationSet(tuple(fixed), lower, upper, tuple(table.kind(j) == "revolute" for j in table.joints))
 
 
-def _radians(entry: ConfigurationEntry, table: DHTable) -> Array:
-    turn = entry.unit == "deg"
-    return np.array(
-        [math.radians(x) if turn and table.kind(j) == "revolute" else x for j, x in zip(table.joints, entry.q, strict=True)]
-    )
+def _radians(entry: ConfigurationEntry, table: DHTable, path: Path, key: str) -> Array:
+    """The joint values in rad and m, (n,). Raises ModelFileError for an angle that is too large."""
+    turns = [table.kind(joint) == "revolute" for joint in table.joints]
+    values = [math.radians(x) if turn and entry.unit == "deg" else x for turn, x in zip(turns, entry.q, strict=True)]
+    for i, (turn, value) in enumerate(zip(turns, values, strict=True)):
+        if turn:
+            checked_angle(value, path, f"{key}.q[{i}]")
+    return np.array(values)
+
+
+def _published(claim: PublishedEntry, unit: Literal["rad", "deg"], path: Path, key: str) -> Published:
+    """The claim in rad and m. Raises ModelFileError for an angle that is too large."""
+    for i, value in enumerate(claim.rpy or ()):
+        checked_angle(math.radians(value) if unit == "deg" else value, path, f"{key}.rpy[{i}]")
+    return Published.from_entry(claim, unit)
 
 
 def _one_joint_at_a_time(table: DHTable, ranges: dict[str, tuple[float, float]]) -> list[Configuration]:
@@ -214,6 +224,9 @@ def _ranges(
             raise ModelFileError(f"no joint {joint!r}; {nearest(joint, table.joints)}", where=path, key=key)
         if len(pair) != 2 or not pair[0] < pair[1]:
             raise ModelFileError(f"expected [lower, upper] with lower < upper, got {pair}", where=path, key=key)
+        if table.kind(joint) == "revolute":
+            for value in pair:
+                checked_angle(value, path, key)
         ranges[joint] = (pair[0], pair[1])
     for joint in table.joints:
         if joint not in ranges:

@@ -10,7 +10,16 @@ from typing import cast, get_args
 
 from harness.description.dh import DHRow, Kind
 from harness.description.toml_file import read_text
-from harness.description.values import Truncation, find_truncation, parse_number
+from harness.description.values import (
+    LARGEST_ANGLE,
+    LARGEST_LENGTH,
+    LONGEST_NAME,
+    Truncation,
+    check_text,
+    find_truncation,
+    parse_number,
+    shown,
+)
 from harness.errors import ModelFileError, nearest
 
 MAX_ROWS = 1000
@@ -26,6 +35,12 @@ class SuspectNumber:
 
 _NAMES = {"joint": "joint", "name": "joint", "theta": "theta", "theta_offset": "theta"}
 _COLUMNS = ("joint", "type", "a", "alpha", "d", "theta")
+_LARGEST = {
+    "a": (LARGEST_LENGTH, "m"),
+    "alpha": (LARGEST_ANGLE, "rad"),
+    "d": (LARGEST_LENGTH, "m"),
+    "theta": (LARGEST_ANGLE, "rad"),
+}
 
 
 def read_dh_csv(path: Path) -> tuple[tuple[DHRow, ...], tuple[SuspectNumber, ...]]:
@@ -75,7 +90,7 @@ def _header(cells: list[str], path: Path, line: int) -> list[str]:
     for cell in (c.strip() for c in cells):
         column = _NAMES.get(cell, cell)
         if column not in _COLUMNS:
-            raise ModelFileError(f"unknown column {cell!r}", where=path, line=line, hint=nearest(cell, (*_COLUMNS, *_NAMES)))
+            raise ModelFileError(f"unknown column {shown(cell)}", where=path, line=line, hint=nearest(cell, (*_COLUMNS, *_NAMES)))
         if column in columns:
             raise ModelFileError(f"column {cell!r} is there twice", where=path, line=line)
         columns.append(column)
@@ -90,13 +105,17 @@ def _row(header: list[str], cells: list[str], path: Path, line: int, suspects: l
     text = {column: cell.strip() for column, cell in zip(header, cells, strict=True)}
     if not text["joint"]:
         raise ModelFileError("expected a joint name, got an empty cell", where=path, line=line)
+    try:
+        check_text(text["joint"], LONGEST_NAME)
+    except ValueError as error:
+        raise ModelFileError(str(error), where=path, line=line, key="column 'joint'") from None
     kind = text.get("type") or "revolute"
     if kind not in get_args(Kind):
-        raise ModelFileError(f"unknown joint type {kind!r}", where=path, line=line, hint=nearest(kind, get_args(Kind)))
+        raise ModelFileError(f"unknown joint type {shown(kind)}", where=path, line=line, hint=nearest(kind, get_args(Kind)))
     numbers: dict[str, float] = {}
-    for column in ("a", "alpha", "d", "theta"):
+    for column, (largest, unit) in _LARGEST.items():
         try:
-            numbers[column] = parse_number(text.get(column) or "0")
+            numbers[column] = parse_number(text.get(column) or "0", largest, unit)
         except ValueError as error:
             raise ModelFileError(str(error), where=path, line=line, key=f"column {column!r}") from None
         if column in ("alpha", "theta") and (why := _suspect_angle(text.get(column, ""), numbers[column])):

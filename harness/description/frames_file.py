@@ -7,19 +7,19 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from harness.description.values import Number, Strict, Transform, Vector3
+from harness.description.values import Angles3, Label, Lengths3, Name, Number, Strict, Transform
 from harness.se3 import Array
 
 
 class FrameEntry(Strict):
     """One `[[frame]]` as written."""
 
-    name: str = Field(min_length=1)
-    dh: int | str | None = None
-    urdf: str | None = None
-    of: str | None = None
-    xyz: Vector3 | None = None
-    rpy: Vector3 | None = None
+    name: Name = Field(min_length=1)
+    dh: Label | None = None
+    urdf: Name | None = None
+    of: Name | None = None
+    xyz: Lengths3 | None = None
+    rpy: Angles3 | None = None
     rigid: bool = False
 
     @model_validator(mode="after")
@@ -46,10 +46,10 @@ class FrameEntry(Strict):
 class JointEntry(Strict):
     """One `[joints.NAME]`: q_urdf = sign * q[NAME] + sum(coupling[k] * q[k]) + offset; `urdf` defaults to NAME."""
 
-    urdf: str | None = None
+    urdf: Name | None = None
     sign: Literal[-1, 1] = 1
     offset: Number = 0.0
-    coupling: dict[str, Number] = {}
+    coupling: dict[Name, Number] = {}
 
 
 class EngineNames(Strict):
@@ -60,20 +60,20 @@ class EngineNames(Strict):
     chain only is to end it at; robot: its own name for a packaged model.
     """
 
-    base: str | None = None
-    frames: dict[str, str] = {}
-    joints: dict[str, str] = {}
-    without: list[str] = []
-    tip: str | None = None
-    robot: str | None = Field(default=None, min_length=1)
+    base: Name | None = None
+    frames: dict[Name, Name] = {}
+    joints: dict[Name, Name] = {}
+    without: list[Name] = []
+    tip: Name | None = None
+    robot: Name | None = Field(default=None, min_length=1)
 
 
 class FramesFile(Strict):
     """frames.toml."""
 
     frame: list[FrameEntry] = Field(min_length=1)
-    joints: dict[str, JointEntry] = {}
-    engine: dict[str, EngineNames] = {}
+    joints: dict[Name, JointEntry] = {}
+    engine: dict[Name, EngineNames] = {}
 
     @field_validator("joints", mode="before")
     @classmethod

@@ -13,6 +13,7 @@ from harness.description.dh import DHTable
 from harness.description.frames import FrameMap
 from harness.description.frames_file import JointEntry
 from harness.description.urdf import MOVABLE, UNSUPPORTED, Urdf, UrdfJoint
+from harness.description.values import checked_angle
 from harness.errors import MappingError, UrdfError, nearest
 from harness.se3 import Array
 
@@ -114,6 +115,8 @@ def resolve_joints(entries: Mapping[str, JointEntry], table: DHTable, urdf: Urdf
                 hint = nearest(other, [j for j in table.joints if j != name])
                 raise MappingError(f"no other joint {other!r}; {hint}", where=path, key=f"joints.{name}.coupling")
             row[table.joints.index(other)] += factor
+        if table.kind(name) == "revolute":
+            checked_angle(entry.offset, path, f"joints.{name}.offset")
         rows[joint.name] = (row, entry.offset)
     _check_chain(source, urdf, frames, path)
     return complete(rows, urdf, len(table.joints))

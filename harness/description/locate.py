@@ -63,6 +63,8 @@ def packaged_file(package: str, file: str, where: Path | None = None, key: str |
     """The one file of an installed distribution whose path ends in `file`. Raises ModelFileError, DescriptionUnavailable."""
     try:
         files = metadata.files(package) or []
+    except ValueError:  # no name at all
+        raise ModelFileError(f"expected the name of an installed package, got {package!r}", where=where, key=key) from None
     except metadata.PackageNotFoundError:
         place = f"{where}: urdf.package: " if where else ""
         raise DescriptionUnavailable(f"{place}{package} is not installed; pip install {package}") from None

@@ -8,19 +8,19 @@ from typing import Literal
 from pydantic import Field, field_validator, model_validator
 
 from harness.description.dh import Convention
-from harness.description.values import Number, Strict, Transform
+from harness.description.values import Angle, Length, Name, Names, Number, Strict, Text, Transform
 
-SourceName = str
+LONGEST_ROBOT_NAME = 128  # reports are named after it, and a file name has at most 255 bytes
 RESERVED = ("index", "report.schema")
 
 
 class Provenance(Strict):
     """Where the numbers of dh.csv come from: document, page, date of the document, and a note."""
 
-    document: str = Field(min_length=1)
-    page: str = ""
-    date: str = ""
-    note: str = ""
+    document: Text = Field(min_length=1)
+    page: Text = ""
+    date: Text = ""
+    note: Text = ""
 
 
 class Tolerance(Strict):
@@ -31,8 +31,8 @@ class Tolerance(Strict):
         rotation: angle between orientations [rad].
     """
 
-    position: Number = Field(gt=0)
-    rotation: Number = Field(gt=0)
+    position: Length = Field(gt=0)
+    rotation: Angle = Field(gt=0)
 
 
 class SourceEntry(Strict):
@@ -46,10 +46,10 @@ class SourceEntry(Strict):
             folder. It is given the URDF if the name begins with `urdf:`, else the DH table.
     """
 
-    name: SourceName = Field(pattern=r"^[A-Za-z][^\s\"]*$")
+    name: Name = Field(pattern=r"^[A-Za-z][^\s\"]*$")
     required: bool = True
     tolerance: Tolerance | None = None
-    command: list[str] | None = Field(default=None, min_length=1)
+    command: list[Text] | None = Field(default=None, min_length=1)
 
     @model_validator(mode="after")
     def _an_engine_or_a_command(self) -> SourceEntry:
@@ -72,13 +72,13 @@ class AcceptedEntry(Strict):
         reason: why it is accepted.
     """
 
-    source: SourceName | list[SourceName]
-    frame: str | list[str]
-    position: Number = Field(default=0.0, ge=0)
-    rotation: Number = Field(default=0.0, ge=0)
+    source: Names
+    frame: Names
+    position: Length = Field(default=0.0, ge=0)
+    rotation: Angle = Field(default=0.0, ge=0)
     within: Number = Field(default=0.02, gt=0, lt=1)
-    cause: dict[str, dict[str, Number]] = {}
-    reason: str = Field(min_length=1)
+    cause: dict[Name, dict[Name, Number]] = {}
+    reason: Text = Field(min_length=1)
 
     @model_validator(mode="after")
     def _deviates(self) -> AcceptedEntry:
@@ -109,15 +109,15 @@ class UrdfEntry(Strict):
         package: an installed distribution; None for a file under urdf/.
     """
 
-    file: str = Field(min_length=1)
-    package: str | None = None
+    file: Name = Field(min_length=1)
+    package: str | None = Field(default=None, pattern=r"^[A-Za-z0-9]([A-Za-z0-9._-]*[A-Za-z0-9])?$", max_length=200)
 
 
 class ModelFile(Strict):
     """model.toml."""
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")
-    description: str = Field(min_length=1)
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=LONGEST_ROBOT_NAME)
+    description: Text = Field(min_length=1)
     convention: Convention
     provenance: Provenance
     tolerance: Tolerance

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from harness import se3
-from harness.description.values import Number, Strict, Vector3
+from harness.description.values import Label, Length, Lengths3, Number, Strict, Text, Vector3
 
 Row = list[Number]
 
@@ -34,17 +34,17 @@ class PublishedEntry(Strict):
         reason: why a wrong one is wrong.
     """
 
-    dh: int | str
-    relative_to: int | str = "base"
+    dh: Label
+    relative_to: Label = "base"
     matrix: list[Row] | None = None
-    position: Vector3 | None = None
+    position: Lengths3 | None = None
     rotation: list[Row] | None = None
     rpy: Vector3 | None = None
-    tolerance: Number = Field(gt=0)
+    tolerance: Length = Field(gt=0)
     rotation_tolerance: Number | None = Field(default=None, gt=0)
-    provenance: str = Field(min_length=1)
+    provenance: Text = Field(min_length=1)
     status: Literal["holds", "wrong"]
-    reason: str = ""
+    reason: Text = ""
 
     @model_validator(mode="after")
     def _complete(self) -> PublishedEntry:

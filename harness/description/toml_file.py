@@ -9,6 +9,7 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
+from harness.description.values import line_of_long_integer, shown
 from harness.errors import ModelFileError, nearest
 
 if sys.version_info >= (3, 11):
@@ -38,10 +39,13 @@ def read_text(path: Path) -> str:
 
 def read_toml(path: Path, table: type[Table]) -> Table:
     """Parse `path` and validate it as `table`. Raises ModelFileError."""
+    text = read_text(path)
     try:
-        data = tomllib.loads(read_text(path))
+        data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ModelFileError(f"not TOML: {error}", where=path) from None
+    except ValueError as error:  # Python refuses to read an integer of thousands of digits
+        raise ModelFileError(f"not a number: {error}", where=path, line=line_of_long_integer(text)) from None
     return validate(data, table, path)
 
 
@@ -69,8 +73,8 @@ def _problem(error: Mapping[str, Any], table: type[BaseModel]) -> str:
     message = str(error["msg"]).removeprefix("Value error, ")
     message = message[0].lower() + message[1:]
     value = error.get("input")
-    if isinstance(value, (str, int, float)) and repr(value) not in message:
-        message += f", got {value!r}"
+    if isinstance(value, (str, int, float)) and shown(value) not in message:
+        message += f", got {shown(value)}"
     return message
 
 

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import os
+import signal
+import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from functools import lru_cache
 from pathlib import Path
+from typing import TypeAlias
 
 from harness.description.model import RobotModel, load_model
 from harness.engines.registry import adapter_of
-from harness.errors import EngineUnavailable
+from harness.errors import EngineFailed, EngineUnavailable
 from harness.mutation.controller import FaultyWorkers
 from harness.mutation.mutant import Mutant
 from harness.mutation.score import MutationScore, Trial, score
@@ -83,16 +88,55 @@ def run_mutants(
         count = len(_prepared(folder)[1])
         chosen = range(0, count, every)
         tasks += [(folder, list(chosen[k : k + CHUNK]), here) for k in range(0, len(chosen), CHUNK)]
-    done: dict[int, list[Trial]] = {}
-    total, finished = sum(len(t[1]) for t in tasks), 0
+    done = _over_the_cores(tasks, jobs or os.cpu_count() or 1, progress)
+    return score([trial for trials in done for trial in trials], every, round(time.perf_counter() - started, 1), absent)
+
+
+Task: TypeAlias = "tuple[Path, list[int], list[str]]"
+
+
+def _over_the_cores(tasks: Sequence[Task], jobs: int, progress: Progress | None) -> list[list[Trial]]:
+    """The trials of each task. Whatever ends it early, an interrupt say, ends its processes too."""
     for name in THREAD_VARIABLES:
         os.environ.setdefault(name, "1")
-    with ProcessPoolExecutor(jobs or os.cpu_count() or 1, multiprocessing.get_context("spawn")) as pool:
-        futures = {pool.submit(_chunk, *task): k for k, task in enumerate(tasks)}
+    done: dict[int, list[Trial]] = {}
+    total, finished = sum(len(task[1]) for task in tasks), 0
+    pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _end_with_parent)
+    try:
+        with _without_interrupts():
+            futures = {pool.submit(_chunk, *task): k for k, task in enumerate(tasks)}
         for future in as_completed(futures):
             done[futures[future]] = future.result()
             finished += len(tasks[futures[future]][1])
             if progress:
                 progress(finished, total)
-    trials = [trial for k in sorted(done) for trial in done[k]]
-    return score(trials, every, round(time.perf_counter() - started, 1), absent)
+    except BrokenProcessPool:
+        raise EngineFailed("mutants", "a process that tried them was killed, or crashed in a library") from None
+    finally:
+        if finished < total:
+            for process in multiprocessing.active_children():
+                process.kill()
+        pool.shutdown(cancel_futures=True)
+    return [done[k] for k in sorted(done)]
+
+
+@contextlib.contextmanager
+def _without_interrupts() -> Iterator[None]:
+    """Processes started in it never see a Ctrl-C: the one that started them ends them. Its own comes afterwards."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _end_with_parent() -> None:
+    """Watch the process that started this one. When it is gone, killed say, nobody wants the result."""
+    parent = multiprocessing.parent_process()
+
+    def watch() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

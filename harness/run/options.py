@@ -6,17 +6,21 @@ from dataclasses import dataclass, field, replace
 from numbers import Integral
 from pathlib import Path
 
+from harness.description.values import shown
 from harness.engines.registry import REFERENCE
 from harness.errors import InputError
 from harness.workers.pool import Workers
 from harness.workers.process import Limits
+
+MOST_SAMPLES = 10**12  # years of computing
+MOST_JOBS = 1024
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
     """What a cross-check is asked to do.
 
-    samples: random configurations, besides the fixed ones.
+    samples: random configurations, besides the fixed ones, at most 10^12.
     seed: their seed, below 2^64.
     sources: the sources to compare, which are then required; empty: those of model.toml.
     reference: the source that the others are compared with.
@@ -26,7 +30,7 @@ class Options:
     all_engines: compare also every engine that model.toml does not list.
     workers: (name, command) of programs that speak the worker protocol.
     limits: time and memory that an engine may take.
-    jobs: engines that compute at a time; 0: one a core.
+    jobs: engines that compute at a time, at most 1024; 0: one a core.
     in_process: engines run here, not in workers, for debugging.
     accepted: folder of the accepted numbers; None: the report does not say what moved since.
     strict: a discrepancy that grew since it was accepted fails.
@@ -76,8 +80,10 @@ class Options:
         if not isinstance(self.sources, tuple) or not all(isinstance(source, str) for source in self.sources):
             raise InputError(f"expected a tuple of source names, got {self.sources!r}", key="sources")
         if self.samples < 0:
-            raise InputError(f"expected samples >= 0, got {self.samples}")
+            raise InputError(f"expected samples >= 0, got {shown(self.samples)}")
+        if self.samples > MOST_SAMPLES:
+            raise InputError(f"expected samples <= {MOST_SAMPLES}, got {shown(self.samples)}")
         if not 0 <= self.seed < 2**64:
-            raise InputError(f"expected 0 <= seed < 2^64, got {self.seed}")
-        if self.jobs < 0:
-            raise InputError(f"expected jobs >= 0, got {self.jobs}")
+            raise InputError(f"expected 0 <= seed < 2^64, got {shown(self.seed)}")
+        if not 0 <= self.jobs <= MOST_JOBS:
+            raise InputError(f"expected jobs >= 0 and <= {MOST_JOBS}, got {shown(self.jobs)}")

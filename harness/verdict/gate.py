@@ -11,11 +11,15 @@ from harness.report.sentences import worsened
 from harness.report.text import metres, radians
 from harness.report.verdicts import Verdict
 
+# What hides what, if several apply. A disagreement found stays found. After a fault of the harness nothing else is sure.
+_ORDER = (ExitCode.DISAGREES, ExitCode.INTERNAL, ExitCode.WRONG_INPUT, ExitCode.NOT_VERIFIED)
+
 
 def combined(codes: Iterable[int]) -> int:
-    """The exit code of several robots. If several apply, the smallest code above 0 wins: a missing source never hides a
-    disagreement."""
-    return min((code for code in codes if code), default=int(ExitCode.AGREES))
+    """The exit code of several robots: 1 before all, then 70, 2 and 3. 0 only if every code is 0, whatever their order."""
+    places = {int(code): place for place, code in enumerate(_ORDER)}
+    above_0 = (code for code in codes if code)
+    return int(min(above_0, key=lambda code: (places.get(code, len(places)), code), default=ExitCode.AGREES))
 
 
 def gate(

@@ -46,7 +46,7 @@ def test_the_start_loads_no_command_and_nothing_heavy(args: tuple[str, ...], tex
     printed, loaded = started(*args)
     assert text in printed
     assert {name for name in loaded if name.startswith("harness.cli.")} == {
-        "harness.cli.main", "harness.cli.lazy", "harness.cli.error_line"
+        "harness.cli.main", "harness.cli.lazy", "harness.cli.error_line", "harness.cli.crash", "harness.cli.output"
     }  # fmt: skip
     assert not loaded & HEAVY
 
