@@ -7,6 +7,9 @@ Each error keeps its facts as fields and prints as one line: where, what was exp
 from __future__ import annotations
 
 import difflib
+import math
+import re
+from bisect import bisect
 from collections.abc import Iterable
 from enum import IntEnum
 from os import PathLike
@@ -54,10 +57,15 @@ class InputError(CrosscheckError, ValueError):
         if line is not None:
             place = f"{place}:{line}" if place else f"line {line}"
         if key is not None:
-            place = f"{place}: {key}" if place else key
-        problem = " ".join(problem.split("\n"))  # parsers report over several lines
+            place = f"{place}: {_in_brief(key)}" if place else _in_brief(key)
+        problem = _in_brief(" ".join(problem.split("\n")))  # parsers report over several lines
         text = f"{place}: {problem}" if place else problem
-        super().__init__(f"{text}; {hint}" if hint else text)
+        super().__init__(f"{text}; {shortened(hint, 4000)}" if hint else text)
+
+
+def _in_brief(text: str) -> str:
+    """A sentence with its longest words cut: a file may hold a name of a million letters."""
+    return shortened(re.sub(r"\S{401,}", lambda word: shortened(word[0]), text), 4000)
 
 
 class ModelFileError(InputError):
@@ -102,9 +110,60 @@ class EngineFailed(CrosscheckError, RuntimeError):
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """`did you mean 'tool0'?` for the known name spelt most like `name`, else the list of known names."""
+    """`did you mean 'tool0'?` for the known name spelt most like `name`, else the list of known names.
+
+    What it costs is bounded, whatever a file holds: of names longer than COMPARED letters the rest is left out, of more than
+    CANDIDATES names only those are compared that stand next to it in the alphabet, and SIMILARITIES bounds the work in all.
+    """
     names = sorted(set(known))
-    close = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
-    if close:
-        return f"did you mean {close[0]!r}?"
-    return f"known: {', '.join(names[:20])}{', ...' if len(names) > 20 else ''}" if names else "there are none"
+    close = _closest(name[:COMPARED], names)
+    if close is not None:
+        return f"did you mean {shortened(close, 160)!r}?"
+    listed = ", ".join(shortened(n) for n in names[:20])
+    return f"known: {listed}{', ...' if len(names) > 20 else ''}" if names else "there are none"
+
+
+COMPARED = 100  # letters
+CANDIDATES = 200  # names
+SIMILARITIES = 40_000  # pairs of letters
+CLOSE = 0.6  # share of letters in common: what difflib's own search takes for alike
+
+
+class Suggestions:
+    """`nearest` for a file that may hold thousands of misspelt names: it suggests for the first MOST of them."""
+
+    MOST = 20
+
+    def __init__(self) -> None:
+        self._count = 0
+
+    def nearest(self, name: str, known: Iterable[str]) -> str:
+        """As `nearest`; how many names there are, once MOST suggestions were made."""
+        self._count += 1
+        return nearest(name, known) if self._count <= self.MOST else f"{len(set(known))} names are known"
+
+
+def _closest(name: str, names: list[str]) -> str | None:
+    """The name that is most like `name`, among sorted names; None if none is. As difflib.get_close_matches, within bounds."""
+    sizes = range(math.ceil(len(name) * CLOSE / (2.0 - CLOSE)), int(len(name) * (2.0 - CLOSE) / CLOSE) + 1)
+    names = [n for n in names if len(n) in sizes or len(n) > COMPARED]
+    middle = min(max(bisect(names, name), CANDIDATES // 2), max(CANDIDATES // 2, len(names) - CANDIDATES // 2))
+    matcher = difflib.SequenceMatcher(b=name)
+    ranked = []
+    for candidate in names[middle - CANDIDATES // 2 : middle + CANDIDATES // 2]:
+        matcher.set_seq1(candidate[:COMPARED])
+        if (most := matcher.quick_ratio()) >= CLOSE:
+            ranked.append((most, candidate))
+    best, work = (CLOSE, ""), 0
+    for most, candidate in sorted(ranked, reverse=True):
+        work += len(name) * min(len(candidate), COMPARED)
+        if most < best[0] or work > SIMILARITIES:
+            break
+        matcher.set_seq1(candidate[:COMPARED])
+        best = max(best, (matcher.ratio(), candidate))
+    return best[1] or None
+
+
+def shortened(text: str, most: int = 80) -> str:
+    """A text of at most so many letters: the rest is counted, not shown."""
+    return text if len(text) <= most else f"{text[:most]}... ({len(text)} letters)"

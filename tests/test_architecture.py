@@ -15,7 +15,7 @@ import pytest
 import harness
 
 ROOT = Path(harness.__file__).parent
-GROUND = {"se3", "errors", "version"}
+GROUND = {"se3", "errors", "version", "reading"}
 
 FLOORS: dict[str, set[str]] = {
     "cli": {
@@ -97,8 +97,8 @@ def test_the_floors_have_no_circle() -> None:
 
 
 @pytest.mark.parametrize("name", [f"{name}.py" for name in sorted(GROUND)])
-def test_the_ground_floor_imports_nothing_of_ours(name: str) -> None:
-    assert imports(ROOT / name) == set()
+def test_the_ground_floor_imports_nothing_else_of_ours(name: str) -> None:
+    assert imports(ROOT / name) == ({"harness.errors"} if name == "reading.py" else set())
 
 
 def test_there_is_no_cycle() -> None:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import cast, get_args
 
 from harness.description.dh import DHRow, Kind
-from harness.description.toml_file import read_text
 from harness.description.values import (
     LARGEST_ANGLE,
     LARGEST_LENGTH,
@@ -21,6 +20,7 @@ from harness.description.values import (
     shown,
 )
 from harness.errors import ModelFileError, nearest
+from harness.reading import MODEL_BYTES, read_text
 
 MAX_ROWS = 1000
 
@@ -49,7 +49,7 @@ def read_dh_csv(path: Path) -> tuple[tuple[DHRow, ...], tuple[SuspectNumber, ...
     Header `joint,type,a,alpha,d,theta` or, as articles have it, `name,a,alpha,d,theta_offset`; `#` starts a comment;
     without a `type` column every row is revolute; an empty cell is zero. Raises ModelFileError with file and line.
     """
-    return parse_dh_csv(read_text(path), path)
+    return parse_dh_csv(read_text(path, MODEL_BYTES, ModelFileError), path)
 
 
 def parse_dh_csv(text: str, path: Path) -> tuple[tuple[DHRow, ...], tuple[SuspectNumber, ...]]:
@@ -72,12 +72,12 @@ def parse_dh_csv(text: str, path: Path) -> tuple[tuple[DHRow, ...], tuple[Suspec
                 raise ModelFileError(f"duplicate joint {row.name!r}, first on line {seen[row.name]}", where=path, line=line)
             seen[row.name] = line
             rows.append(row)
+            if len(rows) > MAX_ROWS:
+                raise ModelFileError(f"expected at most {MAX_ROWS} rows, got more", where=path, line=line)
     except csv.Error as error:
         raise ModelFileError(f"not CSV: {error}", where=path, line=table.line_num) from None
     if header is None or not rows:
         raise ModelFileError("expected a header and at least one row, got none", where=path, hint=f"header: {','.join(_COLUMNS)}")
-    if len(rows) > MAX_ROWS:
-        raise ModelFileError(f"expected at most {MAX_ROWS} rows, got {len(rows)}", where=path)
     return tuple(rows), tuple(suspects)
 
 

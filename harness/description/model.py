@@ -22,6 +22,9 @@ from harness.description.urdf import Urdf
 from harness.description.urdf_file import read_urdf
 from harness.description.urdf_lint import Finding, check
 from harness.errors import MappingError, ModelFileError, nearest
+from harness.reading import URDF_BYTES, read_bytes
+
+MOST_ACCEPTED = 20_000  # pairs of a source and a frame
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,7 +172,9 @@ def _check_sources(file: ModelFile, frames: FrameMap, path: Path) -> None:
             if pair in seen:
                 raise ModelFileError(f"{pair[0]} at {pair[1]} is accepted twice", where=path, key=f"accepted[{i}]")
             seen.add(pair)
+        if len(seen) > MOST_ACCEPTED:
+            raise ModelFileError(f"expected at most {MOST_ACCEPTED} pairs of source and frame", where=path, key=f"accepted[{i}]")
 
 
 def _sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    return hashlib.sha256(read_bytes(path, URDF_BYTES, ModelFileError)).hexdigest()

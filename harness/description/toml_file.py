@@ -2,50 +2,29 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from harness.description.values import line_of_long_integer, shown
+from harness.description.values import shown
 from harness.errors import ModelFileError, nearest
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from harness.reading import MODEL_BYTES, parsed_toml, read_text
 
 Table = TypeVar("Table", bound=BaseModel)
 
-MAX_BYTES = 4_000_000
 
-
-def read_text(path: Path) -> str:
-    """The text of a model file. Raises ModelFileError if it is absent, unreadable, too large or not UTF-8."""
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise ModelFileError(f"expected a file below {MAX_BYTES} bytes, got {path.stat().st_size}", where=path)
-        return path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        present = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
-        raise ModelFileError("no such file", where=path, hint=nearest(path.name, present)) from None
-    except UnicodeDecodeError as error:
-        raise ModelFileError(f"expected UTF-8 text: {error.reason} at byte {error.start}", where=path) from None
-    except OSError as error:
-        raise ModelFileError(f"cannot be read: {error.strerror}", where=path) from None
+# How many a file may have of what every run goes through.
+MOST = {"frame": 500, "source": 200, "accepted": 1000, "configuration": 5000}
 
 
 def read_toml(path: Path, table: type[Table]) -> Table:
     """Parse `path` and validate it as `table`. Raises ModelFileError."""
-    text = read_text(path)
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ModelFileError(f"not TOML: {error}", where=path) from None
-    except ValueError as error:  # Python refuses to read an integer of thousands of digits
-        raise ModelFileError(f"not a number: {error}", where=path, line=line_of_long_integer(text)) from None
+    data = parsed_toml(read_text(path, MODEL_BYTES, ModelFileError), path, ModelFileError)
+    for key, most in MOST.items():
+        if isinstance(entries := data.get(key), list) and len(entries) > most:
+            raise ModelFileError(f"expected at most {most} tables [[{key}]], got {len(entries)}", where=path, key=key)
     return validate(data, table, path)
 
 

@@ -13,8 +13,8 @@ from lxml import etree
 
 from harness.description.urdf import TYPES, Link, Mimic, Urdf, UrdfJoint
 from harness.errors import UrdfError, nearest
+from harness.reading import URDF_BYTES, read_bytes, require_few_tags
 
-MAX_BYTES = 32_000_000
 MAX_LINKS = 5_000
 
 _KEPT = ("origin", "parent", "child", "axis", "limit", "mimic")
@@ -22,20 +22,12 @@ _KEPT = ("origin", "parent", "child", "axis", "limit", "mimic")
 
 def read_urdf(path: Path) -> Urdf:
     """Read a URDF file. Raises UrdfError (file, line) for anything that is not well-formed URDF kinematics."""
-    try:
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise UrdfError(f"expected at most {MAX_BYTES} bytes, got {size}", where=path)
-        return parse_urdf(path.read_bytes(), path)
-    except FileNotFoundError:
-        present = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
-        raise UrdfError("no such file", where=path, hint=nearest(path.name, present)) from None
-    except OSError as error:
-        raise UrdfError(f"cannot be read: {error.strerror}", where=path) from None
+    return parse_urdf(read_bytes(path, URDF_BYTES, UrdfError), path)
 
 
 def parse_urdf(data: bytes, path: Path) -> Urdf:
     """Parse URDF bytes; `path` is for messages. Raises UrdfError."""
+    require_few_tags(data, path, UrdfError)
     robot = _root(data, path)
     links: list[Link] = []
     joints: list[UrdfJoint] = []

@@ -13,7 +13,7 @@ from typing import Literal
 
 from harness.description.urdf import UNSUPPORTED, Urdf, UrdfJoint
 from harness.description.values import find_truncation
-from harness.errors import UrdfError, nearest
+from harness.errors import Suggestions, UrdfError
 
 MAX_DEPTH = 1_000
 
@@ -31,9 +31,10 @@ class Finding:
 
 def lint(urdf: Urdf) -> tuple[Finding, ...]:
     """All findings, errors first, then by line."""
-    findings = [*_names(urdf), *_structure(urdf)]
+    spelling = Suggestions()
+    findings = [*_names(urdf), *_structure(urdf, spelling)]
     for joint in urdf.joint_list:
-        findings += [*_axis(joint), *_mimic(urdf, joint), *_numbers(joint)]
+        findings += [*_axis(joint), *_mimic(urdf, joint, spelling), *_numbers(joint)]
     order = {"error": 0, "warning": 1, "note": 2}
     return tuple(sorted(findings, key=lambda f: (order[f.level], f.line)))
 
@@ -65,13 +66,14 @@ def _names(urdf: Urdf) -> Iterator[Finding]:
                 )
 
 
-def _structure(urdf: Urdf) -> Iterator[Finding]:
+def _structure(urdf: Urdf, spelling: Suggestions) -> Iterator[Finding]:
     links = set(urdf.links)
     above: dict[str, UrdfJoint] = {}
     for joint in urdf.joint_list:
         for role, link in (("parent", joint.parent), ("child", joint.child)):
             if link not in links:
-                message = f"joint {joint.name!r} names {role} link {link!r}, which does not exist; {nearest(link, links)}"
+                hint = spelling.nearest(link, links)
+                message = f"joint {joint.name!r} names {role} link {link!r}, which does not exist; {hint}"
                 yield Finding(code="unknown-link", level="error", subject=joint.name, message=message, line=joint.line)
         if joint.child in above:
             message = f"link {joint.child!r} has two parents: joints {above[joint.child].name!r} and {joint.name!r}"
@@ -133,12 +135,12 @@ def _axis(joint: UrdfJoint) -> Iterator[Finding]:
         yield Finding(code="oblique-axis", level="note", subject=joint.name, message=message, line=joint.line)
 
 
-def _mimic(urdf: Urdf, joint: UrdfJoint) -> Iterator[Finding]:
+def _mimic(urdf: Urdf, joint: UrdfJoint, spelling: Suggestions) -> Iterator[Finding]:
     if joint.mimic is None:
         return
     leader = urdf.joints.get(joint.mimic.joint)
     if leader is None:
-        hint = nearest(joint.mimic.joint, urdf.joints)
+        hint = spelling.nearest(joint.mimic.joint, urdf.joints)
         message = f"joint {joint.name!r} mimics {joint.mimic.joint!r}, which does not exist; {hint}"
         yield Finding(code="unknown-mimic", level="error", subject=joint.name, message=message, line=joint.line)
         return

@@ -40,12 +40,6 @@ def shown(value: object) -> str:
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}... ({len(text)} characters)"
 
 
-def line_of_long_integer(text: str) -> int | None:
-    """Line, from 1, of the first run of more than 1000 digits. None if there is none."""
-    match = re.search(r"\d(?:_?\d){1000}", text)
-    return None if match is None else text.count("\n", 0, match.start()) + 1
-
-
 def parse_number(value: object, largest: float = LARGEST_NUMBER, unit: str = "") -> float:
     """A finite float from a number or a text such as `0.089159`, `-pi/2`.
 

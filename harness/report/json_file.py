@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
 from harness.errors import InputError
+from harness.reading import REPORT_BYTES, parsed_json, read_text
 from harness.report.document import Report
 
 FORMAT = Report.model_fields["format"].default
@@ -28,14 +28,7 @@ def to_json(report: Report) -> str:
 
 def read_report(path: Path) -> Report:
     """Read a report document. Raises InputError if it cannot be read or is not one of this version."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot be read: {getattr(error, 'strerror', None) or error}", where=path) from None
-    try:
-        data = json.loads(text)
-    except ValueError as error:
-        raise InputError(f"not JSON: {error}", where=path) from None
+    data = parsed_json(read_text(path, REPORT_BYTES), path)
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise InputError(f'expected a document with "format": "{FORMAT}"', where=path)
     if data.get("version") != VERSION:

@@ -6,6 +6,7 @@ Small and sorted, to be reviewed like code: largest discrepancies and proven bou
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal, Protocol
@@ -13,6 +14,7 @@ from typing import Literal, Protocol
 from pydantic import ValidationError
 
 from harness.errors import InputError
+from harness.reading import MODEL_BYTES, parsed_json, read_text
 from harness.report.document import GateVerdict, PublishedResult, Report, Robot, Settings, Source
 from harness.report.parts import NonNegative, Part
 from harness.report.regression import Changed, Moved, Quantity, Regression
@@ -109,12 +111,11 @@ def accepted_text(numbers: AcceptedNumbers) -> str:
 
 def read_accepted(path: Path) -> AcceptedNumbers:
     """Read the numbers on file. Raises InputError if there are none, or they cannot be read."""
+    if not os.path.lexists(path):
+        raise InputError("nothing was accepted yet", where=path, hint=f"crosscheck accept {path.stem}")
+    data = parsed_json(read_text(path, MODEL_BYTES), path)
     try:
-        return AcceptedNumbers.model_validate_json(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError("nothing was accepted yet", where=path, hint=f"crosscheck accept {path.stem}") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot be read: {getattr(error, 'strerror', None) or error}", where=path) from None
+        return AcceptedNumbers.model_validate(data)
     except ValidationError as failure:
         first = failure.errors(include_url=False)[0]
         key = ".".join(str(step) for step in first["loc"])

@@ -76,7 +76,7 @@ def test_refused_in_one_line(data: bytes, message: str) -> None:
 def test_a_file_too_large_or_absent(tmp_path: Path) -> None:
     with pytest.raises(UrdfError, match="no such file"):
         read_urdf(tmp_path / "arm.urdf")
-    with pytest.raises(UrdfError, match="cannot be read"):
+    with pytest.raises(UrdfError, match="expected a file, got a folder"):
         read_urdf(tmp_path)
     large = tmp_path / "large.urdf"
     with large.open("wb") as file:

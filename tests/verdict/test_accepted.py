@@ -153,7 +153,7 @@ def test_every_format_tells_what_moved(report: Report, render: Callable[[Report]
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("{", "no accepted numbers: Invalid JSON"),
+        ("{", "not JSON: Expecting property name"),
         ('{"format": "fk-crosscheck report"}', "no accepted numbers: Input should be 'fk-crosscheck accepted'"),
         (None, "nothing was accepted yet; crosscheck accept sixr"),
     ],
