@@ -68,6 +68,7 @@ class RunSettings:
     accepted: Path
     strict: bool
     jobs: int
+    resume: bool
     start_timeout: float
     block_timeout: float
     memory_limit: float
@@ -96,6 +97,7 @@ class RunSettings:
             in_process=self.in_process,
             accepted=self.accepted,
             strict=self.strict,
+            resume=self.resume,
         )
 
 
@@ -134,6 +136,7 @@ class RunSettings:
 )
 @accepted_option
 @click.option("--strict", is_flag=True, help="Fail if a discrepancy grew since it was accepted, by more than the noise floor.")
+@click.option("--resume/--no-resume", default=True, show_default=True, help="Continue an interrupted run of the same inputs.")
 @click.option("--jobs", type=int, default=0, help="Engines that compute at a time.  [default: one a core]")
 @click.option("--start-timeout", type=float, default=Limits.start, show_default=True, help="Seconds for an engine to start.")
 @click.option("--block-timeout", type=float, default=Limits.block, show_default=True, help="Seconds for 4096 configurations.")
@@ -154,7 +157,7 @@ def run(settings: RunSettings) -> int:
     codes: list[int] = []
     names: dict[str, Path] = {}
     reports: list[Report] = []
-    with api.Session(options) as session:
+    with api.Session(options, checkpoints=settings.out) as session:
         for folder in folders:
             try:
                 reports.append(_checked(session, folder, names, settings))

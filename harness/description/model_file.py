@@ -9,9 +9,9 @@ from pydantic import Field, field_validator, model_validator
 
 from harness.description.dh import Convention
 from harness.description.values import Number, Strict, Transform
+from harness.writing import LONGEST_ROBOT_NAME, RESERVED, ROBOT_NAME
 
 SourceName = str
-RESERVED = ("index", "report.schema")
 
 
 class Provenance(Strict):
@@ -116,7 +116,7 @@ class UrdfEntry(Strict):
 class ModelFile(Strict):
     """model.toml."""
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")
+    name: str = Field(pattern=ROBOT_NAME, max_length=LONGEST_ROBOT_NAME)
     description: str = Field(min_length=1)
     convention: Convention
     provenance: Provenance
