@@ -23,7 +23,7 @@ from pydantic import ValidationError
 
 from harness.comparison.compare import Comparison
 from harness.comparison.state import ComparisonState, Count, Part, state_of
-from harness.run.inputs import asked_of, inputs_of
+from harness.run.inputs import SOURCE, asked_of, inputs_of
 from harness.run.outcome import Outcome, Run, Status
 from harness.se3 import Array
 from harness.writing import replace_file
@@ -147,10 +147,12 @@ class Checkpoint:
             state = State.model_validate_json(text)
         except ValidationError:
             raise _MisfitError("it is none of this version", is_stale=True) from None
-        if changed := _differing(state.inputs, self._inputs):
-            raise _MisfitError(f"{changed} is not what it was", is_stale=True)
-        if other := _differing(state.asked, asked_of(self._run)):
+        changed = _differing(state.inputs, self._inputs)
+        other = _differing(state.asked, asked_of(self._run))
+        if other and (not changed or changed.startswith(SOURCE)):  # other sources may be what was asked
             raise _MisfitError(f"it was made with another {other}", is_stale=False)
+        if changed:
+            raise _MisfitError(f"{changed} is not what it was", is_stale=True)
         return state
 
     def drop(self, why: str) -> None:
@@ -176,7 +178,7 @@ class Checkpoint:
         A failure to write is told once, and no more are written: the run goes on.
         """
         start = time.monotonic()
-        failed = [o for o in self._run.outcomes if o.bound is None and f"source {o.name}" in self._inputs]
+        failed = [o for o in self._run.outcomes if o.bound is None and f"{SOURCE}{o.name}" in self._inputs]
         state = State(
             inputs=self._inputs,
             asked=asked_of(self._run),

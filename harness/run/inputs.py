@@ -21,6 +21,7 @@ from harness.errors import CrosscheckError
 from harness.run.outcome import Outcome, Run
 from harness.se3 import Array
 
+SOURCE = "source "  # how the words for a source begin
 LARGEST_PROGRAM = 256_000_000  # bytes of a program's file that is looked into
 
 
@@ -45,7 +46,7 @@ def inputs_of(run: Run) -> dict[str, str]:
         **{f"the file {name}": digest for name, digest in run.model.hashes.items()},
         "the set of configurations": _digest(configurations.fixed_q, configurations.lower, configurations.upper),
     }
-    return inputs | {f"source {o.name}": _source(o, run.model.folder) for o in run.outcomes if o.bound is not None}
+    return inputs | {f"{SOURCE}{o.name}": _source(o, run.model.folder) for o in run.outcomes if o.bound is not None}
 
 
 def _source(outcome: Outcome, model: Path) -> str:
