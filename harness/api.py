@@ -30,6 +30,7 @@ from harness.errors import InputError
 from harness.rendering import files
 from harness.report.document import Report
 from harness.report.json_file import read_report as read_document
+from harness.run.checkpoint import Checkpoints
 from harness.run.options import Options
 from harness.run.streaming import Progress
 from harness.verdict import crosscheck as verdict
@@ -62,9 +63,16 @@ def _check_text(value: object, expected: str) -> None:
 class Session:
     """Cross-checks one robot after the other and keeps the engines running in between: `with Session(options) as session:`."""
 
-    def __init__(self, options: Options | None = None) -> None:
+    def __init__(self, options: Options | None = None, *, checkpoints: str | Path | None = None) -> None:
+        """Start nothing yet.
+
+        options: what is asked; None: the defaults.
+        checkpoints: a folder in which a long run keeps how far it has come. If the session is interrupted, one with the same
+            inputs continues there. One that ends removes what it has kept. None: nothing is kept.
+        """
         self.options = _options(options)
         self._pool = self.options.worker_pool()
+        self._checkpoints = None if checkpoints is None else Checkpoints(Path(checkpoints))
 
     def __enter__(self) -> Session:
         self._pool.__enter__()
@@ -72,6 +80,8 @@ class Session:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self._pool.__exit__(kind, error, trace)
+        if self._checkpoints is not None and error is None:
+            self._checkpoints.remove()
 
     def crosscheck(
         self, model: RobotModel | str | Path, *, progress: Progress | None = None, options: Options | None = None
@@ -86,7 +96,7 @@ class Session:
         """
         model = model if isinstance(model, RobotModel) else load_model(model)
         options = options or self.options
-        return verdict.crosscheck(model, options, progress, self._pool, _on_file(model, options))
+        return verdict.crosscheck(model, options, progress, self._pool, _on_file(model, options), self._checkpoints)
 
 
 def _options(given: Options | None) -> Options:

@@ -15,7 +15,7 @@ import pytest
 import harness
 
 ROOT = Path(harness.__file__).parent
-GROUND = {"se3", "errors", "version", "reading"}
+GROUND = {"se3", "errors", "version", "reading", "writing"}
 
 FLOORS: dict[str, set[str]] = {
     "cli": {

@@ -73,6 +73,7 @@ class RunSettings:
     accepted: Path
     strict: bool
     jobs: int
+    resume: bool
     start_timeout: float
     block_timeout: float
     memory_limit: float
@@ -101,6 +102,7 @@ class RunSettings:
             in_process=self.in_process,
             accepted=self.accepted,
             strict=self.strict,
+            resume=self.resume,
         )
 
 
@@ -139,6 +141,7 @@ class RunSettings:
 )
 @accepted_option
 @click.option("--strict", is_flag=True, help="Fail if a discrepancy grew since it was accepted, by more than the noise floor.")
+@click.option("--resume/--no-resume", default=True, show_default=True, help="Continue an interrupted run of the same inputs.")
 @click.option("--jobs", type=int, default=0, help="Engines that compute at a time.  [default: one a core]")
 @click.option("--start-timeout", type=seconds, default=Limits.start, show_default=True, help="Seconds for an engine to start.")
 @click.option("--block-timeout", type=seconds, default=Limits.block, show_default=True, help="Seconds for 4096 configurations.")
@@ -181,7 +184,7 @@ class Tally:
 
 def _each(folders: Sequence[Path], options: Options, settings: RunSettings, tally: Tally) -> None:
     """Cross-check one robot after the other. What goes wrong with one is told, and ends that one."""
-    with api.Session(options) as session:
+    with api.Session(options, checkpoints=settings.out) as session:
         for folder in folders:
             codes: list[int] = []
             codes.append(attempt(partial(_one, session, folder, settings, tally, codes), folder.name))

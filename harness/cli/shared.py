@@ -7,13 +7,16 @@ import dataclasses
 import functools
 import os
 import sys
+import time
 from collections.abc import Callable, Iterator
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
+from rich.text import Text
 
 from harness.cli.console import console
 from harness.description.locate import default_models_dir, find_model, model_folders
@@ -101,6 +104,42 @@ def folders_of(robots: tuple[str, ...], models: Path) -> list[Path]:
     return list(dict.fromkeys(find_model(robot, models) for robot in robots))
 
 
+class Estimate:
+    """How long a run still takes, at the speed that it has had on the whole.
+
+    The speed counts from the first call of `update`: what was done before, in an interrupted run, took none of this run's time.
+    Between two calls the estimate runs down with the clock.
+    """
+
+    def __init__(self) -> None:
+        self._first: tuple[int, float] | None = None
+        self._last: tuple[int, float] | None = None
+        self._total = 0
+
+    def update(self, done: int, total: int, now: float) -> None:
+        """Take note of the configurations done. now: the time on any clock [s]."""
+        self._first = self._first or (done, now)
+        self._last, self._total = (done, now), total
+
+    def remaining(self, now: float) -> float | None:
+        """The time left [s]; None as long as there is no speed."""
+        if self._first is None or self._last is None or self._last[0] <= self._first[0]:
+            return None
+        done, at = self._last
+        speed = (done - self._first[0]) / max(at - self._first[1], 1e-9)
+        return max(0.0, (self._total - done) / speed - (now - at))
+
+
+class RemainingColumn(ProgressColumn):
+    """The time left, of the task's field `estimate`."""
+
+    def render(self, task: Task) -> Text:
+        """`0:01:40`, or dashes as long as there is no estimate."""
+        estimate: Estimate = task.fields["estimate"]
+        seconds = estimate.remaining(time.monotonic())
+        return Text("-:--:--" if seconds is None else str(timedelta(seconds=round(seconds))), style="progress.remaining")
+
+
 @contextlib.contextmanager
 def progress_bar(name: str, silent: bool) -> Iterator[Callable[[int, int], None]]:
     """A progress bar on stderr for one robot; none when piped, in CI or when silent."""
@@ -108,11 +147,17 @@ def progress_bar(name: str, silent: bool) -> Iterator[Callable[[int, int], None]
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         TextColumn("{task.completed}/{task.total}"),
-        TimeRemainingColumn(),
+        RemainingColumn(),
         console=console(stderr=True),
         transient=True,
         disable=not sys.stderr.isatty() or bool(os.environ.get("CI")) or silent,
     )
+    estimate = Estimate()
+
+    def advance(done: int, total: int) -> None:
+        estimate.update(done, total, time.monotonic())
+        bar.update(task, completed=done, total=total)
+
     with bar:
-        task = bar.add_task(plain(name), total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+        task = bar.add_task(plain(name), total=None, estimate=estimate)
+        yield advance

@@ -9,9 +9,7 @@ from pydantic import Field, field_validator, model_validator
 
 from harness.description.dh import Convention
 from harness.description.values import Angle, Length, Name, Names, Number, Strict, Text, Transform
-
-LONGEST_ROBOT_NAME = 128  # reports are named after it, and a file name has at most 255 bytes
-RESERVED = ("index", "report.schema")
+from harness.writing import LONGEST_ROBOT_NAME, RESERVED, ROBOT_NAME
 
 
 class Provenance(Strict):
@@ -116,7 +114,7 @@ class UrdfEntry(Strict):
 class ModelFile(Strict):
     """model.toml."""
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=LONGEST_ROBOT_NAME)
+    name: str = Field(pattern=ROBOT_NAME, max_length=LONGEST_ROBOT_NAME)
     description: Text = Field(min_length=1)
     convention: Convention
     provenance: Provenance

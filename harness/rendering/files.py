@@ -1,27 +1,32 @@
-"""Writes reports whole or not at all: under a temporary name, then renamed."""
+"""Writes reports: the four files of a robot together or not at all (see `harness.writing`), any other file in one step."""
 
 from __future__ import annotations
 
-import contextlib
-import json
 import os
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 from harness.errors import InputError
-from harness.rendering.html import render_html, render_index
+from harness.rendering.html import render_html
+from harness.rendering.index import write_index
 from harness.rendering.junit import render_junit
 from harness.rendering.markdown import render_markdown
 from harness.report.document import Report
-from harness.report.json_file import FORMAT, read_report, schema, to_json
+from harness.report.json_file import to_json
+from harness.writing import clean, replace_file, replace_together
 
-SCHEMA_NAME = "report.schema.json"
+__all__ = ["prepare", "write", "write_index", "write_rendered", "write_report", "write_summary"]
 
 
 def prepare(folder: Path) -> None:
-    """Create the output folder and make sure it can be written to, before any work. Raises InputError."""
+    """Create the output folder and make sure it can be written to, before any work. Raises InputError.
+
+    What killed runs have left there is put in order: reports half exchanged, temporary files.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        clean(folder)
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
@@ -31,19 +36,32 @@ def prepare(folder: Path) -> None:
 
 
 def write_report(report: Report, folder: Path) -> list[Path]:
-    """Write JSON, HTML, Markdown and JUnit of one robot into `folder`. Raises InputError."""
-    name = report.robot.name
-    return [write(folder / f"{name}.json", to_json(report)), *write_rendered(report, folder)]
+    """Write JSON, HTML, Markdown and JUnit of one robot into `folder`, all four or none. Raises InputError."""
+    return _write_together(report, folder, {f"{report.robot.name}.json": to_json(report), **_rendered(report)})
 
 
 def write_rendered(report: Report, folder: Path) -> list[Path]:
-    """Write what is rendered from the document: HTML, Markdown and JUnit. Raises InputError."""
+    """Write what is rendered from the document, HTML, Markdown and JUnit, all three or none. Raises InputError."""
+    return _write_together(report, folder, _rendered(report))
+
+
+def _rendered(report: Report) -> dict[str, str]:
+    """By file name."""
     name = report.robot.name
-    return [
-        write(folder / f"{name}.html", render_html(report)),
-        write(folder / f"{name}.md", render_markdown(report)),
-        write(folder / f"{name}.junit.xml", render_junit(report)),
-    ]
+    return {
+        f"{name}.html": render_html(report),
+        f"{name}.md": render_markdown(report),
+        f"{name}.junit.xml": render_junit(report),
+    }
+
+
+def _write_together(report: Report, folder: Path, texts: Mapping[str, str]) -> list[Path]:
+    try:
+        replace_together(folder, report.robot.name, texts)
+    except OSError as error:
+        where = folder / f"{report.robot.name}.*"
+        raise InputError(f"cannot be written: {error.strerror}", where=where, hint="choose another --out") from None
+    return [folder / name for name in texts]
 
 
 def write_summary(report: Report) -> None:
@@ -58,27 +76,10 @@ def write_summary(report: Report) -> None:
         raise InputError(f"cannot be written: {error.strerror}", where=path, key="GITHUB_STEP_SUMMARY") from None
 
 
-def write_index(folder: Path) -> Path:
-    """Write `index.html` over every report in `folder`, and the schema beside it. Raises InputError."""
-    write(folder / SCHEMA_NAME, json.dumps(schema(), indent=2) + "\n")
-    reports = []
-    for path in sorted(folder.glob("*.json")):
-        # Other JSON, and reports of another version, are not ours to judge: they are left out of the list.
-        with contextlib.suppress(InputError):
-            if path.name != SCHEMA_NAME and FORMAT in path.read_text(encoding="utf-8", errors="replace")[:200]:
-                reports.append(read_report(path))
-    return write(folder / "index.html", render_index(reports))
-
-
 def write(path: Path, text: str) -> Path:
     """Replace `path` by `text` in one step. Raises InputError if the folder cannot be written to."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        try:
-            temporary.write_text(text, encoding="utf-8")
-            os.replace(temporary, path)
-        finally:
-            temporary.unlink(missing_ok=True)
+        replace_file(path, text)
     except OSError as error:
         raise InputError(f"cannot be written: {error.strerror}", where=path, hint="choose another --out") from None
     return path

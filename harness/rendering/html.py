@@ -6,7 +6,7 @@ Scripts are ours and Plotly's, each allowed by its hash; a script that came in w
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -89,11 +89,17 @@ def render_html(report: Report) -> str:
     return page
 
 
-def render_index(reports: Sequence[Report]) -> str:
-    """The list of all robots."""
+def render_index(reports: Sequence[Report], left_out: Sequence[str] = (), without_page: Collection[str] = ()) -> str:
+    """The list of all robots.
+
+    reports: their reports.
+    left_out: files that are not in the list, each with the reason.
+    without_page: names of robots whose HTML is not there to be linked.
+    """
     pages = (scripts.own("common.js"), scripts.own("index.js"))
     page = _environment().get_template("index.html.j2").render(
         reports=reports, policy=" ".join(page.hash for page in pages), worst={r.robot.name: _worst(r) for r in reports},
+        left_out=left_out, without_page=without_page,
     )  # fmt: skip
     for name, text in (("common", pages[0].text), ("index", pages[1].text)):
         page = page.replace(f"<!--{name}-->", text, 1)

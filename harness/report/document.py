@@ -5,12 +5,15 @@ Units are metres and radians. Everything that varies between two equal runs (tim
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from typing import Literal
+
+from pydantic import Field, model_validator
 
 from harness.report.explanation import Explanation
 from harness.report.model_parts import SideBySide, Trees
 from harness.report.notebook import html_lines, html_table, text_table
-from harness.report.parts import Finite, Matrix, NonNegative, Part
+from harness.report.parts import Configuration, Count, Finite, Matrix, NonNegative, Part, RobotName, Rotation, Vector
 from harness.report.pose import Pose
 from harness.report.regression import Regression
 from harness.report.source_parts import Certificate, FrameResult, Reproducer, Tolerance, TraitNote, Validity
@@ -18,6 +21,12 @@ from harness.report.text import metres, plain, radians
 from harness.report.verdicts import SourceVerdict
 
 WORDS = {0: "PASS", 1: "FAIL", 3: "INCOMPLETE"}
+
+
+def _require(names: Iterable[str], known: set[str], what: str) -> None:
+    """Raise ValueError unless all names are known."""
+    if (unknown := next((name for name in names if name not in known), None)) is not None:
+        raise ValueError(f"it speaks of a {what} that it does not have, {unknown!r}")
 
 
 class Source(Part):
@@ -54,10 +63,30 @@ class Source(Part):
     pose: Pose | None = None
     certificate: Certificate | None = None
 
+    @model_validator(mode="after")
+    def _has_its_worst_frame(self) -> Source:
+        if self.frames and self.worst_frame not in (f.frame for f in self.frames):
+            raise ValueError(f"{self.name}: the worst frame, {self.worst_frame!r}, is none of its frames")
+        return self
+
     @property
     def passes(self) -> bool:
         """Whether its verdict is a good one."""
         return self.verdict.passes
+
+    def places(self) -> Iterator[str]:
+        """Every mapped frame it speaks of."""
+        yield from (f.frame for f in self.frames)
+        yield from (f.frame for f in self.pose.frames) if self.pose else ()
+        yield from (f.frame for f in self.certificate.frames) if self.certificate else ()
+
+    def configurations(self) -> Iterator[Configuration]:
+        """Every configuration it speaks of."""
+        statistics = (s for f in self.frames for s in (f.position, f.rotation))
+        at = [self.pose and self.pose.at, *(s.worst for s in statistics)]
+        at += [self.validity.first, self.validity.again_at] if self.validity else []
+        yield from (place.q for place in at if place)
+        yield from (self.reproducer.q,) if self.reproducer else ()
 
     def cells(self) -> list[str]:
         """Name, verdict, worst frame and the largest discrepancies there; the reason, if nothing was compared."""
@@ -105,10 +134,10 @@ class PublishedResult(Part):
     status: Literal["holds", "wrong"]
     found: Literal["holds", "wrong"]
     reason: str
-    claimed_position: list[Finite]
-    claimed_rotation: Matrix | None
+    claimed_position: Vector
+    claimed_rotation: Rotation | None
     computed: Matrix
-    computed_rpy: list[Finite]
+    computed_rpy: Vector
     tolerance: NonNegative
     rotation_tolerance: NonNegative
     position_error: NonNegative
@@ -127,7 +156,7 @@ class Lint(Part):
 class Robot(Part):
     """The robot model the report is about. Placements are expressed in the frame `base`."""
 
-    name: str
+    name: RobotName
     description: str
     convention: Literal["standard", "modified"]
     provenance: dict[str, str]
@@ -137,6 +166,12 @@ class Robot(Part):
     upper: list[Finite]
     reach: NonNegative
     hashes: dict[str, str]
+
+    @model_validator(mode="after")
+    def _limits_of_each_joint(self) -> Robot:
+        if not len(self.joints) == len(self.lower) == len(self.upper):
+            raise ValueError(f"expected a lower and an upper limit of each of {len(self.joints)} joints")
+        return self
 
 
 class Settings(Part):
@@ -149,10 +184,10 @@ class Settings(Part):
     not_chosen: list[str] = []
     gate: Literal["sampled", "certified"] = "sampled"
     certify: bool = True
-    fixed: int
-    samples: int
-    seed: int
-    subset: int
+    fixed: Count
+    samples: Count
+    seed: int = Field(ge=0, lt=2**64)
+    subset: Count
     command: str
 
 
@@ -209,6 +244,16 @@ class Report(Part):
     lint: list[Lint]
     regression: Regression | None = None
     environment: Environment
+
+    @model_validator(mode="after")
+    def _speaks_of_what_it_has(self) -> Report:
+        """What renders a document looks things up by name. What is not there is refused here, in one line."""
+        sources, frames = {s.name for s in self.sources}, {f.name for f in self.frames}
+        _require((name for pair in self.pairs for name in (pair.a, pair.b)), sources, "source")
+        _require((place for source in self.sources for place in source.places()), frames, "frame")
+        if any(len(q) != len(self.robot.joints) for source in self.sources for q in source.configurations()):
+            raise ValueError(f"expected {len(self.robot.joints)} joint values in each configuration")
+        return self
 
     @property
     def passes(self) -> bool:

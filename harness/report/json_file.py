@@ -42,4 +42,5 @@ def read_report(path: Path) -> Report:
     except ValidationError as failure:
         first = failure.errors(include_url=False)[0]
         key = ".".join(str(step) for step in first["loc"])
-        raise InputError(f"not a report: {first['msg']}", where=path, key=key) from None
+        problem = first["msg"].removeprefix("Value error, ")
+        raise InputError(f"not a report: {problem}", where=path, key=key or None) from None

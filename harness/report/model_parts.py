@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from harness.report.parts import Finite, Part
+from harness.report.parts import Count, Finite, Part
 
 
 class Link(Part):
@@ -31,7 +31,7 @@ class Trees(Part):
 
     dh: list[DHFrame] = []
     urdf: list[Link] = []
-    omitted: int = 0
+    omitted: Count = 0
 
 
 class ParameterPair(Part):

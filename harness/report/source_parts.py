@@ -5,16 +5,20 @@ Units are metres and radians.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from harness.report.parts import Configuration, Matrix, NonNegative, Part
+from pydantic import Field, model_validator
+
+from harness.report.parts import Configuration, Count, Matrix, NonNegative, Part
 from harness.report.verdicts import FrameVerdict
+
+Decade = Annotated[str, Field(pattern=r"^-?[0-9]{1,3}$")]  # a power of ten
 
 
 class At(Part):
     """A configuration: its index (fixed first, then random), its name and q [rad or m]."""
 
-    index: int
+    index: Count
     label: str
     q: Configuration
 
@@ -23,13 +27,13 @@ class Statistics(Part):
     """Of one discrepancy, over all configurations. Quantiles are upper bounds, at most 15.5 % high; `decades` counts
     values by power of ten."""
 
-    count: int
+    count: Count
     max: NonNegative
     mean: NonNegative
     p50: NonNegative
     p95: NonNegative
     p99: NonNegative
-    decades: dict[str, int]
+    decades: dict[Decade, Count]
     worst: At | None
 
 
@@ -90,8 +94,8 @@ class Validity(Part):
     """Placements checked for being placements: finite, last row 0 0 0 1, rotation in SO(3); and for depending on q alone:
     `again` is the largest change of an entry when a configuration, `again_at`, was asked for a second time."""
 
-    checked: int
-    invalid: int
+    checked: Count
+    invalid: Count
     residual: NonNegative
     first: At | None = None
     first_frame: str = ""
@@ -120,8 +124,14 @@ class Certificate(Part):
     status: Literal["certified", "refused"]
     reason: str = ""
     form: str = ""
-    nodes: int = 0
+    nodes: Count = 0
     residual: NonNegative | None = None
     reference_residual: NonNegative | None = None
     limit: NonNegative | None = None
     frames: list[FrameBound] = []
+
+    @model_validator(mode="after")
+    def _certifies_something(self) -> Certificate:
+        if self.status == "certified" and not self.frames:
+            raise ValueError("expected a bound of at least one frame in a certificate")
+        return self

@@ -33,6 +33,7 @@ class Options:
     in_process: engines run here, not in workers, for debugging.
     accepted: folder of the accepted numbers; None: the report does not say what moved since.
     strict: a discrepancy that grew since it was accepted fails.
+    resume: a long run keeps a checkpoint where its session says, and continues one that was interrupted.
 
     Raises InputError for numbers that cannot be.
     """
@@ -51,6 +52,7 @@ class Options:
     in_process: bool = False
     accepted: Path | None = None
     strict: bool = False
+    resume: bool = True
 
     def reproduced_by(self, command: str) -> Options:
         """The same options, with the command line that reproduces them."""

@@ -8,11 +8,13 @@ import time
 from harness.description.model import RobotModel
 from harness.errors import EngineFailed
 from harness.run.certifying import certify_all
+from harness.run.checkpoint import Checkpoints
 from harness.run.explaining import explain_all
 from harness.run.loading import load_all
 from harness.run.options import Options
 from harness.run.outcome import Run
 from harness.run.plan import plan
+from harness.run.resuming import AnswersChangedError, resume
 from harness.run.streaming import Progress, compare
 from harness.run.worst import find_worst, reproduce
 from harness.workers.pool import Workers
@@ -34,13 +36,20 @@ def load(model: RobotModel, options: Options, workers: Workers) -> Run:
     )
 
 
-def run_robot(model: RobotModel, options: Options, progress: Progress | None = None, workers: Workers | None = None) -> Run:
+def run_robot(
+    model: RobotModel,
+    options: Options,
+    progress: Progress | None = None,
+    workers: Workers | None = None,
+    checkpoints: Checkpoints | None = None,
+) -> Run:
     """Cross-check one robot model: every planned source against the reference at every mapped frame.
 
     model: the robot model.
     options: what is asked.
     progress: called as `progress(done, total)` after each block of configurations.
     workers: used and left open, so that the next robot need not start them again; None: workers of its own.
+    checkpoints: where a long run keeps how far it has come, and finds it again if it was interrupted; None: nowhere.
 
     Raises InputError for wrong options. A missing or failing engine is part of the result.
     """
@@ -48,7 +57,16 @@ def run_robot(model: RobotModel, options: Options, progress: Progress | None = N
     with contextlib.ExitStack() as stack:
         workers = workers or stack.enter_context(options.worker_pool())
         run = load(model, options, workers)
-        run.comparison = compare(run, workers, progress)
+        checkpoint = checkpoints.of(run) if checkpoints and options.resume else None
+        begun = None
+        try:
+            begun = resume(run, workers, checkpoint) if checkpoint else None
+        except AnswersChangedError:
+            # What the engines were asked just now may have changed their state: new ones, as if this had not been.
+            workers.settle(())
+            run = load(model, options, workers)
+            checkpoint = checkpoints.of(run) if checkpoints else None
+        run.comparison = compare(run, workers, progress, checkpoint, begun)
         if run.comparison is not None:
             reproduce(run)
             find_worst(run)

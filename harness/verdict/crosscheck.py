@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from harness.description.model import RobotModel
 from harness.report.document import Report
+from harness.run.checkpoint import Checkpoints
 from harness.run.options import Options
 from harness.run.robot import run_robot
 from harness.run.streaming import Progress
@@ -18,6 +19,7 @@ def crosscheck(
     progress: Progress | None = None,
     workers: Workers | None = None,
     accepted: AcceptedNumbers | None = None,
+    checkpoints: Checkpoints | None = None,
 ) -> Report:
     """Cross-check one robot model.
 
@@ -26,7 +28,8 @@ def crosscheck(
     progress: called as `progress(done, total)` after each block of configurations.
     workers: used and left open, so that the next robot need not start them again; None: workers of its own.
     accepted: the numbers on file, if the report is to say what moved since.
+    checkpoints: where a long run keeps how far it has come; None: nowhere.
 
     Raises InputError for wrong options. A missing or failing engine is part of the report.
     """
-    return assemble(run_robot(model, options, progress, workers), accepted)
+    return assemble(run_robot(model, options, progress, workers, checkpoints), accepted)
