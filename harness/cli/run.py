@@ -47,7 +47,7 @@ def _workers(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
             words = tuple(shlex.split(text))
         except ValueError as error:
             raise InputError(f"not a command line: {error}", key=f"--worker {value}") from None
-        if not name or not equals or not words:
+        if not name.isprintable() or not name or not equals or not words:
             raise InputError(f"expected NAME=COMMAND, got {value!r}", key="--worker")
         if name in dict(pairs):
             raise InputError(f"{name!r} is there twice", key="--worker")
@@ -234,7 +234,8 @@ def _command(folder: Path, models: Path | None, options: Options) -> str:
     words += ["--samples", str(options.samples), "--seed", str(options.seed)]
     flags = {"--no-certify": not options.certify, "--no-explain": not options.explain, "--strict": options.strict}
     words += [flag for flag, wanted in flags.items() if wanted]
-    return shlex.join(words)
+    # A path need not be text; the report is.
+    return shlex.join(words).encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
 
 def _print(report: Report, settings: RunSettings) -> None:

@@ -99,6 +99,8 @@ def _over_the_cores(tasks: Sequence[Task], jobs: int, progress: Progress | None)
     """The trials of each task. Whatever ends it early, an interrupt say, ends its processes too."""
     for name in THREAD_VARIABLES:
         os.environ.setdefault(name, "1")
+    # Interrupted twice, nothing is tidied up: that Python then frees what is left over is nothing to be warned of.
+    os.environ.setdefault("PYTHONWARNINGS", "ignore::UserWarning:multiprocessing.resource_tracker")
     done: dict[int, list[Trial]] = {}
     total, finished = sum(len(task[1]) for task in tasks), 0
     pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _end_with_parent)
