@@ -216,7 +216,7 @@ def test_an_absent_file_is_named_with_its_neighbour(tmp_path: Path) -> None:
 
 def test_a_model_has_so_many_frames_sources_and_configurations(copy_model: Callable[..., Path]) -> None:
     entries = {
-        "model.toml": ('[[source]]\nname = "dh:{}"\n', 201, "expected at most 200 tables [[source]]"),
+        "model.toml": ('[[source]]\nname = "dh:{}"\n', 65, "expected at most 64 tables [[source]]"),
         "frames.toml": ('[[frame]]\nname = "{}"\ndh = 0\n', 501, "expected at most 500 tables [[frame]]"),
         "configurations.toml": ('[[configuration]]\nname = "{}"\nunit = "rad"\nq = []\n', 5001, "expected at most 5000"),
     }

@@ -51,7 +51,8 @@ def _of_joints(state: State) -> Iterator[tuple[Change, Recipe]]:
         P[i, i] = -1.0
         text = f"{joint} turns the other way in {source}: its sign is flipped"
         yield Change(kind="sign", side="between", subject=joint, text=text), mixed(state.a, P)
-    for i in range(n):
+    few = () if state.problem.budget.pairs_left_out else range(n)
+    for i in few:
         for j in range(i + 1, n):
             if slides[i] == slides[j]:
                 P = np.eye(n)
@@ -64,7 +65,7 @@ def _of_joints(state: State) -> Iterator[tuple[Change, Recipe]]:
             Change(kind="order", side="between", subject="all", parameter="reversed", text=text),
             mixed(state.a, np.eye(n)[::-1]),
         )
-    for i, j in permutations(range(n), 2):
+    for i, j in permutations(few, 2):
         for factor in (1.0, -1.0):
             P = np.eye(n)
             P[i, j] = factor

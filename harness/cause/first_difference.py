@@ -16,10 +16,15 @@ TRIED = 8  # configurations at which a chain is compared with its own screws
 
 
 def first_difference(problem: Problem, joints: tuple[str, ...], prismatic: tuple[bool, ...]) -> str:
-    """The first difference of the two chains, in words.
+    """What was not searched, and the first difference of the two chains, in words.
 
     joints, prismatic: name of each joint, and whether it slides.
     """
+    remark = problem.budget.remark()
+    return f"{remark}: {_first(problem, joints, prismatic)}" if remark else _first(problem, joints, prismatic)
+
+
+def _first(problem: Problem, joints: tuple[str, ...], prismatic: tuple[bool, ...]) -> str:
     frame, observed, probe = problem.fitted_frames[-1], problem.observed["check"], problem.probe
     if not all(np.isfinite(T[:, frame]).all() for T in (observed.a, observed.b)):
         return "its placements are not all finite"

@@ -16,6 +16,7 @@ from harness.kinematics.recipes import TableRecipe, UrdfRecipe, asked
 from harness.se3 import Array
 
 SAME = 1e-9
+COMPARED = 8  # to compare two batches of placements takes as long as so many factors
 
 
 def mapping_repairs(state: State) -> Iterator[State]:
@@ -59,7 +60,10 @@ def _read_as_specified(state: State, b: UrdfRecipe) -> Iterator[State]:
 def _links(state: State, b: UrdfRecipe) -> dict[str, Array]:
     """Placements (N, 4, 4) of every link that hangs together with the base."""
     names = {name: name for name in b.urdf.links}
-    T = asked(b.bare(b.base, names), b.P).placements(state.problem.observed["fit"].q)
+    q = state.problem.observed["fit"].q
+    mechanism = asked(b.bare(b.base, names), b.P)
+    state.problem.budget.spend(len(mechanism.factors), len(q))
+    T = mechanism.placements(q)
     return dict(zip(names, np.moveaxis(T, 1, 0), strict=True))
 
 
@@ -97,6 +101,7 @@ def _other_links(state: State, b: UrdfRecipe, links: Mapping[str, Array]) -> Ite
         if here is None or here == b.base:
             continue
         off = max(fit.errors(T_a[:, i : i + 1], T_b[:, i : i + 1])) > max(state.problem.tolerance)
+        state.problem.budget.spend(COMPARED * len(links) if off else 1, len(T_a))
         for link, T in links.items():
             if not off or link == here or not _differ(T, links[here]):
                 continue
@@ -125,6 +130,7 @@ def _other_labels(state: State, a: TableRecipe) -> Iterator[State]:
     if not off or a.backwards:
         return
     labels = {label: (label, np.eye(4)) for label in a.table.frames}
+    state.problem.budget.spend(COMPARED * len(labels) * (1 + len(off)), len(T_a))
     placed = asked(of_table(a.table, labels), a.P).placements(state.problem.observed["fit"].q)
     for i in off:
         name = state.problem.names[i]

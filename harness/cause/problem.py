@@ -11,6 +11,7 @@ import numpy as np
 
 from harness import se3
 from harness.cause import fit
+from harness.cause.budget import Budget
 from harness.cause.changes import Change, of_parameter
 from harness.cause.probe import PARTS, Observations, Part, Probe
 from harness.kinematics.mechanism import Mechanism, Parameter
@@ -56,6 +57,11 @@ class Problem:
     labels: tuple[str, str] = ("a", "b")
     sources: tuple[str, str] = ("a", "b")
     engines: tuple[str, str] = ("a", "b")
+
+    @cached_property
+    def budget(self) -> Budget:
+        """How much work the search for a cause has done, and may do."""
+        return Budget(self.probe.random.shape[1])
 
     @cached_property
     def fitted_frames(self) -> list[int]:
@@ -153,6 +159,7 @@ class State:
         if mechanism is None:
             return observed
         q = self.problem.observed[part].q
+        self.problem.budget.spend(len(mechanism.factors), len(q))
         return mechanism.placements(q, self.problem.names) + self.problem.unmodelled[end, part]
 
     @cached_property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import combinations
 
@@ -13,6 +14,7 @@ from harness.se3 import Array
 
 STEPS = 12
 RANK = 1e-9  # relative size of singular values below which a direction counts as undetermined
+MOST_SETS = 1_000_000  # of so many sets of numbers the best is looked for
 ALIKE = 1e-10  # two numbers move everything alike if the cosine between their effects is this near to 1
 
 
@@ -32,6 +34,7 @@ def derivatives(state: State, wanted: Sequence[Knob]) -> Array:
         mechanism = state.mechanism(end)
         if not own or mechanism is None:
             continue
+        problem.budget.spend(len(mechanism.factors) + len(own), len(q) * len(names))
         T, xi, moves = mechanism.twists(q, names)
         slots = [mechanism.parameters.index(k.parameter) for k in own]
         J = fit.derivatives(T, xi[slots], moves[slots]).reshape(len(own), -1)
@@ -77,7 +80,7 @@ def combined(state: State, count: int, most: int) -> list[State]:
 
     Each set of numbers is solved by linear least squares.
     count: how many numbers are changed together, 2 or 3.
-    most: how many states are returned.
+    most: how many states are returned. None are, if there are more than MOST_SETS sets.
     """
     every = knobs(state)
     J, r = derivatives(state, every), gap(state)
@@ -85,6 +88,9 @@ def combined(state: State, count: int, most: int) -> list[State]:
     useful = [i for i in range(len(every)) if sizes[i] > 1e-9]
     J = J[useful] / sizes[useful, None]
     useful, J = _distinct(useful, J)
+    if math.comb(len(useful), count) > MOST_SETS:
+        return []
+    state.problem.budget.spend(math.comb(len(useful), count), 0)
     G, h = J @ J.T, J @ r
     sets = np.array(list(combinations(range(len(useful)), count)))
     if not len(sets):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Iterable, Iterator, Sequence
 
 from harness.cause import fit
@@ -13,6 +14,7 @@ from harness.cause.refine import polish
 from harness.se3 import Array
 
 REFINED = 8  # how many of the most promising states are fitted again with all their numbers
+FIT = 20  # a number is fitted by so many placements of its frames
 GROSS = 1e-3  # of the reach: below it no wrong joint, unit or frame is looked for
 SAME_MECHANISM = 5.0  # two repairs whose residuals differ by no more than this factor are one mechanism
 
@@ -38,6 +40,7 @@ def numbers(state: State) -> Iterator[State]:
         if mechanism is None:
             continue
         wanted = T - problem.unmodelled[end, "fit"][:, problem.fitted_frames]
+        problem.budget.spend(len(mechanism.factors) + FIT * len(mechanism.parameters), wanted.shape[0] * wanted.shape[1])
         target = fit.Target(problem.observed["fit"].q, problem.fitted_names, wanted)
         for residual, parameter, delta in fit.each_alone(mechanism, target):
             knob = Knob(end, parameter)
@@ -67,12 +70,12 @@ def _plainness(state: State) -> tuple[int, list[tuple[float, str, str]]]:
 
 def promising(state: State, count: int) -> list[State]:
     """The `count` states with one change more that leave least."""
-    return sorted(singles(state), key=lambda s: s.residual)[:count]
+    return heapq.nsmallest(count, singles(state), key=lambda s: s.residual)
 
 
 def refined(states: Iterable[State]) -> Iterator[State]:
     """The most promising, each fitted again with all its numbers if that may help."""
-    for state in sorted(states, key=lambda s: s.residual)[:REFINED]:
+    for state in heapq.nsmallest(REFINED, states, key=lambda s: s.residual):
         better = polish(state) if len(state.shifts) > 1 else state
         yield state if better is None else better
 

@@ -225,6 +225,7 @@ def random_limits(table: DHTable, urdf: Urdf | None, joint_map: JointMap | None)
     Prismatic ones without limits are not in the result: no range can be assumed.
     """
     ranges: dict[str, tuple[float, float]] = {}
+    single = [] if joint_map is None else np.count_nonzero(joint_map.A, axis=1) == 1
     for i, name in enumerate(table.joints):
         if table.kind(name) == "revolute":
             ranges[name] = (-math.pi, math.pi)
@@ -232,7 +233,7 @@ def random_limits(table: DHTable, urdf: Urdf | None, joint_map: JointMap | None)
             continue
         for row, joint_name in enumerate(joint_map.names):
             joint, a = urdf.joints[joint_name], joint_map.A[row]
-            alone = abs(a[i]) == 1.0 and np.count_nonzero(a) == 1 and joint.mimic is None
+            alone = single[row] and abs(a[i]) == 1.0 and joint.mimic is None
             if alone and joint.type != "continuous" and joint.limits and joint.limits[0] < joint.limits[1]:
                 ends = sorted((limit - joint_map.b[row]) / a[i] for limit in joint.limits)
                 ranges[name] = (float(ends[0]), float(ends[1]))

@@ -16,7 +16,7 @@ Table = TypeVar("Table", bound=BaseModel)
 
 
 # How many a file may have of what every run goes through.
-MOST = {"frame": 500, "source": 200, "accepted": 1000, "configuration": 5000}
+MOST = {"frame": 500, "source": 64, "accepted": 1000, "configuration": 5000}
 
 
 def read_toml(path: Path, table: type[Table]) -> Table:

@@ -16,6 +16,7 @@ from harness.description.values import find_truncation
 from harness.errors import Suggestions, UrdfError
 
 MAX_DEPTH = 1_000
+LONGEST_MIMIC = 32  # joints that follow each other
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,13 +146,17 @@ def _mimic(urdf: Urdf, joint: UrdfJoint, spelling: Suggestions) -> Iterator[Find
         yield Finding(code="unknown-mimic", level="error", subject=joint.name, message=message, line=joint.line)
         return
     seen = [joint.name]
-    while leader is not None and leader.mimic is not None and leader.name not in seen:
+    while leader is not None and leader.mimic is not None and leader.name not in seen and len(seen) <= LONGEST_MIMIC:
         seen.append(leader.name)
         leader = urdf.joints.get(leader.mimic.joint)
     if leader is not None and leader.name in seen:
         yield Finding(
             code="mimic-cycle", level="error", subject=joint.name, message=f"joint {joint.name!r} mimics itself", line=joint.line
         )
+        return
+    if len(seen) > LONGEST_MIMIC:
+        message = f"joint {joint.name!r} mimics through more than {LONGEST_MIMIC} others"
+        yield Finding(code="mimic-chain", level="error", subject=joint.name, message=message, line=joint.line)
         return
     message = f"joint {joint.name!r} mimics {joint.mimic.joint!r}: many libraries ignore that; crosscheck engines lists them"
     yield Finding(code="mimic", level="warning", subject=joint.name, message=message, line=joint.line)

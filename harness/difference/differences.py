@@ -48,7 +48,11 @@ def diff(a: Operand, b: Operand, tolerance: tuple[float, float]) -> Difference:
     convention: Convention = next((o.table.convention for o in (a, b) if o.table is not None), "standard")
     tables = [canonical_side(_mechanism(recipe), convention, TIP) for recipe in recipes]
     # What is compared modulo base and tool is between the axes: standard rows say it for either convention.
-    standard = [canonical_side(_mechanism(recipe), "standard", TIP).rows for recipe in recipes]
+    same_convention = convention == "standard"
+    standard = [
+        t.rows if same_convention else canonical_side(_mechanism(r), "standard", TIP).rows
+        for t, r in zip(tables, recipes, strict=True)
+    ]
     return Difference(
         a=a,
         b=b,

@@ -13,7 +13,7 @@ from harness.description.dh import DHRow
 from harness.description.locate import model_folders
 from harness.difference.operands import TIP, Operand
 from harness.difference.reading import TOOLBOX, Ends, read_operand
-from harness.errors import CrosscheckError, EngineFailed, EngineUnavailable, ExitCode, InputError
+from harness.errors import CrosscheckError, EngineFailed, EngineUnavailable, ExitCode, InputError, shortened
 from harness.kinematics.canonical import canonical
 from harness.kinematics.invariants import Matching, ParameterDifference, match
 from harness.kinematics.screws import chain_screws, finite_steps
@@ -73,7 +73,9 @@ class Identification:
     def headline(self) -> str:
         """What was asked about."""
         kinds = "".join("P" if slides else "R" for slides in self.operand.prismatic)
-        return plain(f"{self.operand.label}: {len(kinds)} joints, {kinds}; base, tool, joint signs and zero offsets aside")
+        return plain(
+            f"{self.operand.label}: {len(kinds)} joints, {shortened(kinds)}; base, tool, joint signs and zero offsets aside"
+        )
 
     def table(self, most: int = 10) -> tuple[list[str], list[list[str]]]:
         """Header and rows of the nearest tables, at most so many."""

@@ -40,7 +40,8 @@ class Operand:
             return TableRecipe(self.table, {TIP: ("tool", np.eye(4))})
         if self.urdf is None:
             raise ValueError("neither a table nor a URDF")
-        rows = {names[joint]: (np.eye(len(order))[i], 0.0) for i, joint in enumerate(order)}
+        units = np.eye(len(order))  # once: a row of its own for each joint would keep n matrices
+        rows = {names[joint]: (units[i], 0.0) for i, joint in enumerate(order)}
         kinds = dict(zip(self.joints, self.prismatic, strict=True))
         slides = tuple(kinds[names[joint]] for joint in order)
         joints = complete(rows, self.urdf, len(order))

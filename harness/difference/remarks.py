@@ -1,4 +1,4 @@
-"""What the changed lengths of an explanation have in common: another unit, or digits that were left off."""
+"""What is to be said beside an explanation: another unit, digits that were left off, a search that was ended."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from harness.cause.explain import Explanation
 
 
 def remarks(explanation: Explanation) -> list[str]:
-    """One sentence each; empty if the lengths have nothing in common."""
+    """One sentence each; empty if the lengths have nothing in common, and if the search was not ended."""
+    sentences = []
+    if explanation.ended:
+        sentences.append(f"the search for changes that do the same was ended after {explanation.ended} evaluations")
     lengths = _lengths(explanation)
     if len(lengths) < 2:
-        return []
-    sentences = []
+        return sentences
     ratios = sorted(1.0 + c.size / c.before for c in lengths if min(abs(c.before), abs(c.before + c.size)) > 1e-6)
     middle = ratios[len(ratios) // 2] if ratios else 1.0
     if len(ratios) >= 3 and ratios[-1] < 1.1 * ratios[0] and abs(math.log(abs(middle))) > math.log(1.5):

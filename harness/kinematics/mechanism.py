@@ -60,6 +60,11 @@ class Factor:
     sign: float = 1.0
     T: Array | None = None
 
+    @property
+    def idle(self) -> bool:
+        """Whether it changes nothing: a turn or a move by zero."""
+        return self.T is None and self.row is None and self.value == 0.0
+
 
 @dataclass(frozen=True)
 class Mechanism:
@@ -81,11 +86,15 @@ class Mechanism:
         q: configurations (N, n) [rad or m].
         names: the F frames; None for all, in the order of `frames`.
         """
-        return self._read(self._all(q), names)
-
-    def _read(self, T: Array, names: Sequence[str] | None) -> Array:
-        at = [self.frames[name] + 1 for name in (self.frames if names is None else names)]
-        return np.moveaxis(T[at], 0, 1)
+        ends = [self.frames[name] for name in (self.frames if names is None else names)]
+        kept, last = set(ends), {factor.parent: k for k, factor in enumerate(self.factors)}
+        T: dict[int, Array] = {-1: np.tile(np.eye(4), (len(q), 1, 1))}
+        for k, factor in enumerate(self.factors):
+            before = T[factor.parent]
+            T[k] = before if factor.idle else _step(before, factor, q)
+            if last[factor.parent] == k and factor.parent not in kept:
+                del T[factor.parent]  # a chain of a thousand joints has ten thousand factors
+        return np.moveaxis(np.stack([T[end] for end in ends]), 0, 1) if ends else np.empty((len(q), 0, 4, 4))
 
     def _all(self, q: Array) -> Array:
         """Placement of the end of every factor, the base first: (len(factors) + 1, N, 4, 4)."""
@@ -93,8 +102,7 @@ class Mechanism:
         T[0] = np.eye(4)
         for k, factor in enumerate(self.factors, start=1):
             before = T[factor.parent + 1]
-            idle = factor.T is None and factor.row is None and factor.value == 0.0
-            T[k] = before if idle else _step(before, factor, q)
+            T[k] = before if factor.idle else _step(before, factor, q)
         return T
 
     @cached_property
@@ -108,7 +116,7 @@ class Mechanism:
         xi = np.zeros((len(self.parameters), len(q), 6))
         moves = np.zeros((len(self.parameters), len(names)), dtype=bool)
         slot = {parameter: k for k, parameter in enumerate(self.parameters)}
-        ends = [self.frames[name] for name in names]
+        above = [self._above(self.frames[name]) for name in names]
         for index, factor in enumerate(self.factors):
             if factor.parameter is None:
                 continue
@@ -118,16 +126,17 @@ class Mechanism:
                 xi[k, :, :3], xi[k, :, 3:] = np.cross(before[:, :3, 3], axis), axis
             else:
                 xi[k, :, :3] = axis
-            moves[k] |= [index in self._above[end] for end in ends]
-        return self._read(T, names), xi, moves
+            moves[k] |= [index in factors for factors in above]
+        at = [self.frames[name] + 1 for name in names]
+        return np.moveaxis(T[at], 0, 1), xi, moves
 
-    @cached_property
-    def _above(self) -> tuple[frozenset[int], ...]:
-        """For each factor, itself and all before it on the way from the base; the base, index -1, has none."""
-        out: list[frozenset[int]] = []
-        for k, factor in enumerate(self.factors):
-            out.append((out[factor.parent] if factor.parent >= 0 else frozenset()) | {k})
-        return (*out, frozenset())
+    def _above(self, end: int) -> set[int]:
+        """A factor and all before it on the way from the base; the base, index -1, has none."""
+        out = set()
+        while end >= 0:
+            out.add(end)
+            end = self.factors[end].parent
+        return out
 
     def value(self, parameter: Parameter) -> float:
         """The parameter's value [m or rad]."""

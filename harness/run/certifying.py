@@ -21,6 +21,8 @@ from harness.run.outcome import Certified, Outcome, Run
 from harness.se3 import Array
 from harness.workers.pool import Workers
 
+MOST_PLACEMENTS = 4_000_000  # of one source, 96 bytes each
+
 Certify: TypeAlias = "Callable[[Outcome], Certified]"
 
 
@@ -144,6 +146,9 @@ def _link_bounds(run: Run, outcome: Outcome, axes: list[Axis], common: _Common) 
     links = chain_links(run.model, common.frames)
     if any(math.prod(axes[j].count for j in link.joints) > GRID_LIMIT for link in links):
         raise UncertifiableError("too many joints between two mapped frames: map the frames between them")
+    nodes = sum(math.prod(axes[j].count for j in link.joints) for link in links)
+    if nodes * len(common.frames) > MOST_PLACEMENTS:
+        raise UncertifiableError(f"too many frames: {len(common.frames)}, at {nodes} configurations")
     own, base = (
         sample_links(_rows(_evaluate(o.running()), rows), axes, links, np.random.default_rng(run.options.seed))
         for o, rows in ((outcome, common.rows_a), (run.reference, common.rows_b))
