@@ -10,6 +10,7 @@ from harness.description.dh import DHTable
 from harness.description.tidy import angle_text, is_identity, number_text, transform_toml
 from harness.errors import InputError
 from harness.se3 import Array
+from harness.writing import LONGEST_ROBOT_NAME, RESERVED, ROBOT_NAME, replace_together
 
 POSITION_TOLERANCE, ROTATION_TOLERANCE = 1e-9, 1e-8
 
@@ -24,21 +25,27 @@ def dh_csv(table: DHTable) -> str:
 
 
 def write_model(derived: Derived, name: str, source: str, folder: Path) -> Path:
-    """Write the four files of a robot model, and the URDF's kinematics beside them, to `folder`/`name`.
+    """Write the four files of a robot model, and the URDF's kinematics beside them, to `folder`/`name`: all of them or none.
 
-    Raises InputError if the folder cannot be written to, or a name cannot stand in a CSV cell.
+    Raises InputError if the folder cannot be written to, or a name cannot be that of a robot or stand in a CSV cell.
     """
+    if not re.fullmatch(ROBOT_NAME.strip("^$"), name) or len(name) > LONGEST_ROBOT_NAME or name.lower() in RESERVED:
+        expected = f"expected at most {LONGEST_ROBOT_NAME} letters, digits, '_', '.', '-', beginning with a letter or a digit"
+        raise InputError(f"{expected}, and none of {', '.join(RESERVED)}; got {name[:80]!r}", key="name of the robot model")
     for row in derived.table.rows:
         if re.search(r'[,"#\n]', row.name):
             raise InputError(f"joint name {row.name!r} cannot stand in dh.csv", where=derived.urdf.path)
     robot = folder / name
+    texts = {
+        "dh.csv": dh_csv(derived.table),
+        "model.toml": _model_toml(derived, name, source),
+        "frames.toml": _frames_toml(derived),
+        "configurations.toml": _configurations_toml(derived),
+        f"{name}.urdf": derived.urdf.text,
+    }
     try:
         robot.mkdir(parents=True, exist_ok=True)
-        (robot / "dh.csv").write_text(dh_csv(derived.table), encoding="utf-8")
-        (robot / "model.toml").write_text(_model_toml(derived, name, source), encoding="utf-8")
-        (robot / "frames.toml").write_text(_frames_toml(derived), encoding="utf-8")
-        (robot / "configurations.toml").write_text(_configurations_toml(derived), encoding="utf-8")
-        (robot / f"{name}.urdf").write_text(derived.urdf.text, encoding="utf-8")
+        replace_together(robot, name, texts)
     except OSError as error:
         raise InputError(f"cannot be written: {error.strerror}", where=robot, hint="choose another --out") from None
     return robot

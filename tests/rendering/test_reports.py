@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import pytest
@@ -16,6 +17,7 @@ from harness.description.model import RobotModel, load_model
 from harness.errors import InputError
 from harness.rendering.files import prepare, write, write_index, write_report, write_summary
 from harness.rendering.html import render_html
+from harness.rendering.index import LARGEST
 from harness.rendering.junit import render_junit
 from harness.rendering.markdown import render_markdown
 from harness.report.document import Report
@@ -23,6 +25,7 @@ from harness.report.json_file import read_report, schema, to_json
 from harness.report.text import metres, numbers, plain, radians
 from harness.run.options import Options
 from harness.verdict.accepted import accepted_from
+from harness.writing import replace_together
 from tests.helpers import compared, crosscheck, remade
 
 FAST = ("dh:pinocchio", "urdf:pinocchio")
@@ -152,17 +155,139 @@ def test_index_lists_every_report_in_the_folder(reports: dict[str, Report], disa
     assert json.loads((tmp_path / "report.schema.json").read_text()) == json.loads(json.dumps(schema()))
 
 
-def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_index_leaves_out_what_it_cannot_read_and_says_so(
+    reports: dict[str, Report], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_report(reports["sixr"], tmp_path)
+    assert capsys.readouterr().err == ""
+    text = (tmp_path / "sixr.json").read_text()
+    (tmp_path / "a.json").mkdir()
+    (tmp_path / "b.json").symlink_to("nowhere")
+    (tmp_path / "c.json").write_text("[" * 100_000)
+    os.mkfifo(tmp_path / "d.json")
+    (tmp_path / "e.json").symlink_to("/dev/zero")
+    with (tmp_path / "f.json").open("wb") as file:
+        file.truncate(LARGEST + 1)
+    (tmp_path / "g.json").write_bytes(b"\xff\xfe\xfd")
+    (tmp_path / "h.json").write_text(text.replace('"worst_frame": "', '"worst_frame": "no '))
+    (tmp_path / "i.json").write_text('{"format": "fk-crosscheck report", "version": "0.1"}')
+    (tmp_path / "j.json").write_text("1" * 5000)
+    (tmp_path / "k<b>\x1b.json").write_text("[]")
+    (tmp_path / "copy.json").write_text(text)
+    (tmp_path / "mutation.json").write_text('{"format": "fk-crosscheck mutation score"}')  # ours, and no report
+    page = lxml_html.fromstring(write_index(tmp_path).read_text())
+    assert "All 1 robots agree" in page.text_content()
+    listed = [li.text_content() for li in page.xpath("//ul/li")]
+    names = [*(f"{c}.json" for c in "abc"), "copy.json", *(f"{c}.json" for c in "defghij"), "k<b>\ufffd.json"]
+    assert [text.split(" (")[0] for text in listed] == names
+    assert "expected a file" in listed[0]
+    assert "belongs into sixr.json" in listed[3]
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert err.startswith(f"note: not listed in {tmp_path / 'index.html'}: a.json (")
+    assert err.endswith("and 7 more\n")
+
+
+def test_the_index_links_only_to_what_is_there(reports: dict[str, Report], tmp_path: Path) -> None:
+    for name in ("sixr", "stanford"):
+        write_report(reports[name], tmp_path)
+    (tmp_path / "sixr.html").unlink()
+    page = lxml_html.fromstring(write_index(tmp_path).read_text())
+    assert [a.get("href") for a in page.iter("a")] == ["stanford.html"]
+    assert "sixr" in page.text_content()
+
+
+def full(*_: object) -> None:
+    raise OSError(28, "No space left on device")
+
+
+@pytest.mark.parametrize("call", ["replace", "write", "symlink", "fsync"])
+def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str) -> None:
     path = write(tmp_path / "report.json", "old")
-
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "replace", full)
+    if call == "symlink":
+        write_together(tmp_path, "old")
+    monkeypatch.setattr(os, call, full)
     with pytest.raises(InputError, match="cannot be written: No space left on device"):
-        write(path, "new")
+        write_together(tmp_path, "new") if call == "symlink" else write(path, "new")
     assert path.read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["report.json"]
+
+
+def write_together(folder: Path, text: str) -> None:
+    """One file as `write_report` writes four."""
+    try:
+        replace_together(folder, "report", {"report.json": text})
+    except OSError as error:
+        raise InputError(f"cannot be written: {error.strerror}") from None
+
+
+@pytest.mark.parametrize("call", ["replace", "write", "symlink", "link", "mkdir"])
+@pytest.mark.parametrize("step", [1, 2, 3, 4])
+def test_a_full_disk_leaves_all_reports_of_a_robot(
+    reports: dict[str, Report], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str, step: int
+) -> None:
+    write_report(reports["sixr"], tmp_path)
+    before = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
+    real, count = getattr(os, call), [0]
+
+    def fails(*args: Any, **kwargs: Any) -> Any:
+        count[0] += 1
+        return full() if count[0] >= step else real(*args, **kwargs)
+
+    later = remade(reports["sixr"], settings=remade(reports["sixr"].settings, command="another"))
+    monkeypatch.setattr(os, call, fails)
+    monkeypatch.setattr("shutil.copy2", full)
+    if call == "mkdir" and step == 4:  # there are but three folders
+        write_report(later, tmp_path)
+        return
+    with pytest.raises(InputError, match=r"sixr\.\*: cannot be written: No space left on device; choose another --out"):
+        write_report(later, tmp_path)
+    monkeypatch.undo()
+    prepare(tmp_path)
+    assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before
+
+
+@pytest.mark.parametrize("kind", ["a file", "read only", "no such"])
+def test_a_folder_that_cannot_be_written_to(
+    reports: dict[str, Report], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    folder = tmp_path / "reports"
+    if kind == "a file":
+        folder.write_text("")
+    elif kind == "read only":  # root may write anywhere: the system says what it says of a disk that is read only
+        folder.mkdir()
+
+        def refuses(*_: object, **__: object) -> None:
+            raise OSError(30, "Read-only file system")
+
+        monkeypatch.setattr(os, "open", refuses)
+        monkeypatch.setattr(os, "mkdir", refuses)
+    reason = {"a file": "Not a directory|File exists", "read only": "Read-only", "no such": "No such file"}[kind]
+    for attempt in (lambda: write_report(reports["sixr"], folder), lambda: write_index(folder), lambda: write(folder / "x", "")):
+        with pytest.raises(InputError, match=f"cannot be written: ({reason})"):
+            attempt()
+    if kind != "no such":
+        with pytest.raises(InputError, match=f"cannot write reports here: ({reason})"):
+            prepare(folder)
+
+
+def test_the_next_start_ends_what_a_killed_one_has_begun(reports: dict[str, Report], tmp_path: Path) -> None:
+    write_report(reports["sixr"], tmp_path)
+    hidden = tmp_path / f".sixr.{'a' * 16}.crosscheck-swap"
+    for side in ("old", "new"):
+        (hidden / side).mkdir(parents=True)
+    (hidden / "now").symlink_to("new")
+    (hidden / "new" / "sixr.md").write_text("new")
+    (hidden / "old" / "sixr.md").write_text("old")
+    (tmp_path / "sixr.md").unlink()
+    (tmp_path / "sixr.md").symlink_to(f"{hidden.name}/now/sixr.md")
+    (tmp_path / f".index.html.{'b' * 16}.crosscheck-tmp").write_text("half")
+    assert (tmp_path / "sixr.md").read_text() == "new"
+    prepare(tmp_path)
+    assert (tmp_path / "sixr.md").read_text() == "new"
+    assert sorted(p.name for p in tmp_path.iterdir() if not p.is_symlink()) == sorted(
+        f"sixr.{end}" for end in ("html", "json", "junit.xml", "md")
+    )
 
 
 def test_the_output_folder_is_made(tmp_path: Path) -> None:
