@@ -14,6 +14,10 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from harness import se3
 
+# What a description can hold. Larger numbers are slips, and overflow as soon as they are multiplied.
+LARGEST_LENGTH = 1e9  # [m]
+LARGEST_ANGLE = 1e6  # [rad]
+
 _PI = re.compile(r"(?P<sign>[+-]?)\s*(?:(?P<times>[1-9]\d*)\s*\*\s*)?pi(?:\s*/\s*(?P<over>[1-9]\d*))?")
 
 
