@@ -124,6 +124,7 @@ def recorded(source: str, code: str, case: Case) -> str:
     return "refuses" if Refusal in kinds else "misreads" if Misreading in kinds and case.placed is not None else "reads"
 
 
+@pytest.mark.filterwarnings("ignore")  # of the libraries, on purpose provoked
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("source", engines(*URDF_ENGINES))
 def test_the_traits_say_what_the_engine_does(source: str, name: str, workers: Workers) -> None:
