@@ -109,6 +109,10 @@ class EngineFailed(CrosscheckError, RuntimeError):
         super().__init__(f"{source}: {reason}")
 
 
+class EngineRefused(EngineFailed):
+    """The library of an engine has read the description, and says why it does not take it."""
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """`did you mean 'tool0'?` for the known name spelt most like `name`, else the list of known names.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import click
@@ -16,6 +17,7 @@ from harness.description.model import RobotModel
 from harness.description.urdf import Urdf, UrdfJoint
 from harness.description.urdf_file import read_urdf
 from harness.description.urdf_lint import lint
+from harness.engines.lint_traits import messages
 from harness.rendering.tables import bare_table
 from harness.report.text import numbers, plain
 
@@ -41,10 +43,10 @@ def show_frames(robot: str, models: Path | None, out: Console) -> int:
         _show_dh(model, out)
         if model.urdf is not None:
             _show_tree(model.urdf, _mapped(model), out)
-    for finding in findings:
+    for finding, message in zip(findings, messages(findings), strict=True):
         style = {"error": "red", "warning": "yellow", "note": "dim"}[finding.level]
         where = f"line {finding.line}: " if finding.line else ""
-        out.print(Text(f"{finding.level}: {where}{plain(finding.message)}", style=style), soft_wrap=True)
+        out.print(Text(f"{finding.level}: {where}{plain(message)}", style=style), soft_wrap=True)
     return 2 if any(f.level == "error" for f in findings) else 0
 
 
@@ -101,9 +103,22 @@ def _describe(joint: UrdfJoint) -> str:
     parts = [f"{joint.name}: {joint.type}"]
     if joint.type != "fixed":
         parts.append(f"axis {numbers(joint.axis)}" if joint.axis else "no axis")
+        parts.append(_limits(joint))
     parts.append(f"xyz {numbers(joint.xyz)}")
     if any(joint.rpy):
         parts.append(f"rpy {numbers(joint.rpy)}")
     if joint.mimic:
         parts.append(f"mimics {joint.mimic.multiplier:g} * {joint.mimic.joint} + {joint.mimic.offset:g}")
     return ", ".join(parts)
+
+
+def _limits(joint: UrdfJoint) -> str:
+    """`-90 to 90 deg`, `0 to 0.5 m`; `no limit` where there is none, or where the numbers mean none."""
+    lower, upper = joint.range
+    factor, unit = (1.0, "m") if joint.type == "prismatic" else (math.degrees(1.0), "deg")
+    ends = [f"{value * factor:.6g}" if value is not None else "" for value in (lower, upper)]
+    if lower is not None and upper is not None:
+        return f"limits {ends[0]} to {ends[1]} {unit}"
+    if lower is not None:
+        return f"limits from {ends[0]} {unit}, no upper limit"
+    return f"limits up to {ends[1]} {unit}, no lower limit" if upper is not None else "no limit"

@@ -13,7 +13,7 @@ from harness.description.dh import DHTable
 from harness.description.frames import FrameMap
 from harness.description.frames_file import JointEntry
 from harness.description.urdf import MOVABLE, UNSUPPORTED, Urdf, UrdfJoint
-from harness.description.values import checked_angle
+from harness.description.values import LARGEST_ANGLE, LARGEST_LENGTH, checked_angle
 from harness.errors import MappingError, UrdfError, nearest
 from harness.se3 import Array
 
@@ -186,10 +186,33 @@ def mapped_chain(urdf: Urdf, frames: FrameMap) -> dict[str, UrdfJoint]:
 
 
 def leader_of(urdf: Urdf, joint: UrdfJoint) -> UrdfJoint:
-    """The joint that a follower follows in the end; a joint that follows none itself."""
-    while joint.mimic is not None:
-        joint = urdf.joints[joint.mimic.joint]
+    """The joint that a follower follows in the end; a joint that follows none itself, or is fixed.
+
+    Raises:
+        UrdfError: a leader does not exist.
+    """
+    while joint.mimic is not None and joint.type != "fixed":
+        leader = urdf.joints.get(joint.mimic.joint)
+        if leader is None:
+            raise UrdfError(
+                f"joint {joint.name!r} mimics {joint.mimic.joint!r}, which does not exist",
+                where=urdf.path,
+                line=joint.line,
+                hint=nearest(joint.mimic.joint, urdf.joints),
+            )
+        joint = leader
     return joint
+
+
+def _follows(urdf: Urdf, joint: UrdfJoint) -> bool:
+    """Whether it follows another joint; not if a leader does not exist: then nothing moves it."""
+    if joint.mimic is None:
+        return False
+    try:
+        leader_of(urdf, joint)
+    except UrdfError:
+        return False
+    return True
 
 
 def complete(rows: Mapping[str, tuple[Array, float]], urdf: Urdf, n: int) -> JointMap:
@@ -197,12 +220,14 @@ def complete(rows: Mapping[str, tuple[Array, float]], urdf: Urdf, n: int) -> Joi
 
     Args:
         rows: for each URDF joint that is driven its row of A, (n,), and its entry of b [rad or m].
-        urdf: the URDF; its followers follow their leader, all other joints stay at zero.
+        urdf: the URDF; its followers follow their leader, all other joints stay at zero, followers without a leader too.
         n: number of model joints.
     """
 
+    followers = {name for name in urdf.movable if _follows(urdf, urdf.joints[name])}
+
     def row(joint: UrdfJoint) -> tuple[Array, float]:
-        if joint.mimic is None:
+        if joint.mimic is None or joint.name not in followers:
             return rows.get(joint.name, (np.zeros(n), 0.0))
         a, b = row(urdf.joints[joint.mimic.joint])
         return joint.mimic.multiplier * a, joint.mimic.multiplier * b + joint.mimic.offset
@@ -213,15 +238,16 @@ def complete(rows: Mapping[str, tuple[Array, float]], urdf: Urdf, n: int) -> Joi
         names=urdf.movable,
         A=np.array([a for a, _ in pairs]).reshape(len(joints), n),
         b=np.array([b for _, b in pairs]),
-        followers=tuple(j.name for j in joints if j.mimic is not None),
-        held=tuple(j.name for j in joints if j.mimic is None and j.name not in rows),
+        followers=tuple(j.name for j in joints if j.name in followers),
+        held=tuple(j.name for j in joints if j.name not in followers and j.name not in rows),
     )
 
 
 def random_limits(table: DHTable, urdf: Urdf | None, joint_map: JointMap | None) -> dict[str, tuple[float, float]]:
     """Range of each model joint for random draws, (lower, upper) [rad or m].
 
-    It is the URDF's where a URDF joint is that joint up to sign and offset. Revolute joints without limits get [-pi, pi].
+    It is the URDF's where a URDF joint is that joint up to sign and offset. Revolute joints without limits get [-pi, pi];
+    limits that no description can hold mean none.
     Prismatic ones without limits are not in the result: no range can be assumed.
     """
     ranges: dict[str, tuple[float, float]] = {}
@@ -234,7 +260,12 @@ def random_limits(table: DHTable, urdf: Urdf | None, joint_map: JointMap | None)
         for row, joint_name in enumerate(joint_map.names):
             joint, a = urdf.joints[joint_name], joint_map.A[row]
             alone = single[row] and abs(a[i]) == 1.0 and joint.mimic is None
-            if alone and joint.type != "continuous" and joint.limits and joint.limits[0] < joint.limits[1]:
+            if alone and joint.type != "continuous" and joint.limits and _is_range(joint.limits, joint.type == "prismatic"):
                 ends = sorted((limit - joint_map.b[row]) / a[i] for limit in joint.limits)
                 ranges[name] = (float(ends[0]), float(ends[1]))
     return ranges
+
+
+def _is_range(limits: tuple[float, float], slides: bool) -> bool:
+    """Whether configurations can be drawn between two limits [m if it slides, else rad]."""
+    return limits[0] < limits[1] and max(map(abs, limits)) <= (LARGEST_LENGTH if slides else LARGEST_ANGLE)

@@ -12,6 +12,7 @@ from harness.description.configurations import ConfigurationSet, ConfigurationsF
 from harness.description.dh import DHTable
 from harness.description.dh_csv import SuspectNumber, read_dh_csv
 from harness.description.engine_names import check_engine_names
+from harness.description.finding import Finding
 from harness.description.frames import FrameMap, resolve_frames
 from harness.description.frames_file import EngineNames, FramesFile
 from harness.description.joints import JointMap, identity_map, mapped_chain, random_limits, resolve_joints
@@ -20,7 +21,7 @@ from harness.description.model_file import ModelFile
 from harness.description.toml_file import read_toml
 from harness.description.urdf import Urdf
 from harness.description.urdf_file import read_urdf
-from harness.description.urdf_lint import Finding, check
+from harness.description.urdf_lint import check
 from harness.errors import MappingError, ModelFileError, nearest
 from harness.reading import URDF_BYTES, read_bytes
 

@@ -7,11 +7,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
+from harness.description.finding import Finding
 from harness.errors import InputError, UrdfError, nearest
 
 MOVABLE = ("revolute", "continuous", "prismatic")
 UNSUPPORTED = ("floating", "planar")
 TYPES = (*MOVABLE, "fixed", *UNSUPPORTED)
+
+# From here on a joint limit means that there is none: files write 1000, 10000, 999999, 1e16.
+NO_LIMIT = 1e3  # [rad or m]
 
 
 class Mimic(NamedTuple):
@@ -20,6 +24,13 @@ class Mimic(NamedTuple):
     joint: str
     multiplier: float
     offset: float
+
+
+class Limit(NamedTuple):
+    """What a `<limit>` says beside the range, as it is written; None where the attribute is absent."""
+
+    effort: str | None
+    velocity: str | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +46,7 @@ class UrdfJoint:
         rpy: origin, (3,) roll, pitch, yaw [rad].
         axis: (3,) as written, of any length; None if there is none.
         limits: (lower, upper) [rad or m]; None if there are none.
+        limit: the rest of its `<limit>`; None if it has no such element.
         mimic: the joint it follows; None if it follows none.
         line: line in the file.
         texts: (attribute, text) of its numbers as they are written, for the lint.
@@ -48,9 +60,18 @@ class UrdfJoint:
     rpy: tuple[float, ...]
     axis: tuple[float, ...] | None
     limits: tuple[float, float] | None
+    limit: Limit | None
     mimic: Mimic | None
     line: int
     texts: tuple[tuple[str, str], ...]
+
+    @property
+    def range(self) -> tuple[float | None, float | None]:
+        """Its lower and upper limit [rad or m]; None for an end without a limit, or with a number that means none."""
+        if self.limits is None or self.type == "continuous":
+            return None, None
+        lower, upper = self.limits
+        return (lower if abs(lower) < NO_LIMIT else None), (upper if abs(upper) < NO_LIMIT else None)
 
 
 @dataclass(frozen=True)
@@ -74,7 +95,7 @@ class UrdfText:
     tip: str = field(default="", kw_only=True)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Urdf(UrdfText):
     """The kinematics of one URDF. It may be malformed as a tree: see `urdf_lint.check`.
 
@@ -83,12 +104,14 @@ class Urdf(UrdfText):
         name: name of the robot.
         link_list: links in document order.
         joint_list: joints in document order.
+        remarks: what was noticed while it was read, for the lint.
     """
 
     path: Path
     name: str
     link_list: tuple[Link, ...]
     joint_list: tuple[UrdfJoint, ...]
+    remarks: tuple[Finding, ...] = ()
 
     @cached_property
     def links(self) -> tuple[str, ...]:

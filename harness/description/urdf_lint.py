@@ -8,32 +8,21 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Literal
 
+from harness.description.finding import MOST_NAMED, Finding, Level
 from harness.description.urdf import UNSUPPORTED, Urdf, UrdfJoint
+from harness.description.urdf_limit_lint import lint_limits
 from harness.description.values import find_truncation
-from harness.errors import Suggestions, UrdfError
+from harness.errors import Suggestions, UrdfError, nearest
 
 MAX_DEPTH = 1_000
 LONGEST_MIMIC = 32  # joints that follow each other
 
 
-@dataclass(frozen=True, kw_only=True)
-class Finding:
-    """One lint result. `error`: not a kinematic tree, refused; `warning`: engines are known to differ on it; `note`."""
-
-    code: str
-    level: Literal["error", "warning", "note"]
-    subject: str
-    message: str
-    line: int
-
-
 def lint(urdf: Urdf) -> tuple[Finding, ...]:
     """All findings, errors first, then by line."""
     spelling = Suggestions()
-    findings = [*_names(urdf), *_structure(urdf, spelling)]
+    findings = [*urdf.remarks, *_names(urdf), *_structure(urdf), *lint_limits(urdf)]
     for joint in urdf.joint_list:
         findings += [*_axis(joint), *_mimic(urdf, joint, spelling), *_numbers(joint)]
     order = {"error": 0, "warning": 1, "note": 2}
@@ -67,20 +56,24 @@ def _names(urdf: Urdf) -> Iterator[Finding]:
                 )
 
 
-def _structure(urdf: Urdf, spelling: Suggestions) -> Iterator[Finding]:
-    links = set(urdf.links)
+def _structure(urdf: Urdf) -> Iterator[Finding]:
     above: dict[str, UrdfJoint] = {}
     for joint in urdf.joint_list:
-        for role, link in (("parent", joint.parent), ("child", joint.child)):
-            if link not in links:
-                hint = spelling.nearest(link, links)
-                message = f"joint {joint.name!r} names {role} link {link!r}, which does not exist; {hint}"
-                yield Finding(code="unknown-link", level="error", subject=joint.name, message=message, line=joint.line)
         if joint.child in above:
             message = f"link {joint.child!r} has two parents: joints {above[joint.child].name!r} and {joint.name!r}"
             yield Finding(code="two-parents", level="error", subject=joint.child, message=message, line=joint.line)
         above.setdefault(joint.child, joint)
-    depth = _depths(urdf, above)
+    links = set(urdf.links)
+    missing = [
+        (role, link, joint)
+        for joint in urdf.joint_list
+        for role, link in (("parent", joint.parent), ("child", joint.child))
+        if link not in links
+    ]
+    yield from _missing(missing, links)
+    # Below a parent that does not exist there may be a whole tree, and no cycle.
+    tops = [*urdf.roots, *dict.fromkeys(link for role, link, _ in missing if role == "parent")]
+    depth = _depths(urdf, above, tops)
     in_cycle = [link for link in urdf.link_list if link.name not in depth]
     if in_cycle:
         names = ", ".join(link.name for link in in_cycle[:5])
@@ -90,16 +83,38 @@ def _structure(urdf: Urdf, spelling: Suggestions) -> Iterator[Finding]:
         deepest = max(depth, key=lambda name: depth[name])
         message = f"expected a tree at most {MAX_DEPTH} joints deep, got {depth[deepest]}"
         yield Finding(code="too-deep", level="error", subject=deepest, message=message, line=0)
-    for root in urdf.roots[1:]:
+    # A link whose joint misspells it looks like another root.
+    for root in () if missing else urdf.roots[1:]:
         line = next(link.line for link in urdf.link_list if link.name == root)
         message = f"link {root!r} cannot be reached from the root {urdf.roots[0]!r}: no joint has it as its child"
         yield Finding(code="unreachable-link", level="error", subject=root, message=message, line=line)
 
 
-def _depths(urdf: Urdf, above: dict[str, UrdfJoint]) -> dict[str, int]:
-    """Distance from its root of every link that has one; links on or below a cycle are left out."""
-    depth: dict[str, int] = dict.fromkeys(urdf.roots, 0)
-    queue = list(urdf.roots)
+def _missing(missing: list[tuple[str, str, UrdfJoint]], links: set[str]) -> Iterator[Finding]:
+    """One finding for all links that joints name and that do not exist; missing: role, link and joint of each."""
+    first = {(role, link): joint for role, link, joint in reversed(missing)}
+    names = dict.fromkeys((role, link) for role, link, _ in missing)
+    if not names:
+        return
+    sentences = []
+    for role, link in list(names)[:MOST_NAMED]:
+        sentences.append(f"{role} link {link!r} does not exist (joint {first[role, link].name!r}); {nearest(link, links)}")
+    if len(names) > MOST_NAMED:
+        sentences.append(f"and {len(names) - MOST_NAMED} more links do not exist")
+    joint = missing[0][2]
+    yield Finding(code="unknown-link", level="error", subject=joint.name, message="; ".join(sentences), line=joint.line)
+
+
+def _depths(urdf: Urdf, above: dict[str, UrdfJoint], tops: list[str]) -> dict[str, int]:
+    """Distance from its root of every link that has one; links on or below a cycle are left out.
+
+    Args:
+        urdf: the URDF.
+        above: the first joint above each link.
+        tops: where to start: the roots, and parents that do not exist.
+    """
+    depth: dict[str, int] = dict.fromkeys(tops, 0)
+    queue = list(tops)
     while queue:
         link = queue.pop()
         for joint in urdf.children(link):
@@ -113,11 +128,18 @@ def _axis(joint: UrdfJoint) -> Iterator[Finding]:
     if joint.type == "fixed":
         return
     if joint.type in UNSUPPORTED:
-        message = f"joint {joint.name!r} is {joint.type}: engines read it differently, and no DH row matches it"
-        yield Finding(code="unsupported-joint", level="warning", subject=joint.name, message=message, line=joint.line)
+        message = f"joint {joint.name!r} is {joint.type}: no DH row matches it"
+        yield Finding(
+            code="unsupported-joint",
+            level="warning",
+            subject=joint.name,
+            message=message,
+            line=joint.line,
+            joint_type=joint.type,
+        )
         return
     if joint.axis is None:
-        message = f"joint {joint.name!r} has no <axis>: x by the specification, z in some engines"
+        message = f"joint {joint.name!r} has no <axis>: x by the specification"
         yield Finding(code="missing-axis", level="warning", subject=joint.name, message=message, line=joint.line)
         return
     length = math.sqrt(sum(x * x for x in joint.axis))
@@ -129,24 +151,43 @@ def _axis(joint: UrdfJoint) -> Iterator[Finding]:
         return
     # Files write 0.7071 0.7071 0 and mean a unit vector; engines differ as soon as it is off by more than rounding.
     if abs(length - 1.0) > 1e-12:
-        message = f"joint {joint.name!r} has axis {text} of length {length:.9g}: some engines scale the travel by it"
-        yield Finding(code="unnormalised-axis", level="warning", subject=joint.name, message=message, line=joint.line)
+        message = f"joint {joint.name!r} has axis {text} of length {length:.9g}, not 1"
+        yield Finding(
+            code="unnormalised-axis",
+            level="warning",
+            subject=joint.name,
+            message=message,
+            line=joint.line,
+            joint_type=joint.type,
+        )
     if sum(x != 0.0 for x in joint.axis) > 1:
-        message = f"joint {joint.name!r} has the oblique axis {text}: some engines turn it the wrong way"
+        message = f"joint {joint.name!r} has the oblique axis {text}"
         yield Finding(code="oblique-axis", level="note", subject=joint.name, message=message, line=joint.line)
 
 
 def _mimic(urdf: Urdf, joint: UrdfJoint, spelling: Suggestions) -> Iterator[Finding]:
     if joint.mimic is None:
         return
+    fixed = joint.type == "fixed"  # then nothing moves, whatever it says
     leader = urdf.joints.get(joint.mimic.joint)
     if leader is None:
         hint = spelling.nearest(joint.mimic.joint, urdf.joints)
         message = f"joint {joint.name!r} mimics {joint.mimic.joint!r}, which does not exist; {hint}"
-        yield Finding(code="unknown-mimic", level="error", subject=joint.name, message=message, line=joint.line)
+        level: Level = "note" if fixed else "warning"
+        yield Finding(code="unknown-mimic", level=level, subject=joint.name, message=message, line=joint.line)
+    if fixed:
+        message = f"joint {joint.name!r} is fixed and mimics {joint.mimic.joint!r}: nothing moves"
+        yield Finding(code="fixed-mimic", level="note", subject=joint.name, message=message, line=joint.line)
+    if leader is None or fixed:
         return
     seen = [joint.name]
-    while leader is not None and leader.mimic is not None and leader.name not in seen and len(seen) <= LONGEST_MIMIC:
+    while (
+        leader is not None
+        and leader.mimic is not None
+        and leader.type != "fixed"
+        and leader.name not in seen
+        and len(seen) <= LONGEST_MIMIC
+    ):
         seen.append(leader.name)
         leader = urdf.joints.get(leader.mimic.joint)
     if leader is not None and leader.name in seen:
@@ -158,7 +199,7 @@ def _mimic(urdf: Urdf, joint: UrdfJoint, spelling: Suggestions) -> Iterator[Find
         message = f"joint {joint.name!r} mimics through more than {LONGEST_MIMIC} others"
         yield Finding(code="mimic-chain", level="error", subject=joint.name, message=message, line=joint.line)
         return
-    message = f"joint {joint.name!r} mimics {joint.mimic.joint!r}: many libraries ignore that; crosscheck engines lists them"
+    message = f"joint {joint.name!r} mimics {joint.mimic.joint!r}"
     yield Finding(code="mimic", level="warning", subject=joint.name, message=message, line=joint.line)
 
 

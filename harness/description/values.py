@@ -24,6 +24,10 @@ LARGEST_NUMBER = 1e9  # of anything else, and of what may be either
 LONGEST_NAME = 1000  # characters
 LONGEST_TEXT = 100_000  # characters
 
+# What a description can hold. Larger numbers are slips, and overflow as soon as they are multiplied.
+LARGEST_LENGTH = 1e9  # [m]
+LARGEST_ANGLE = 1e6  # [rad]
+
 _PI = re.compile(r"(?P<sign>[+-]?)\s*(?:(?P<times>[1-9]\d*)\s*\*\s*)?pi(?:\s*/\s*(?P<over>[1-9]\d*))?")
 _SHOWN = 60  # characters of a value in a message
 

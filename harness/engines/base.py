@@ -42,6 +42,31 @@ class Trait:
     evidence: str
     lint: str | None = None
 
+    @property
+    def version(self) -> str:
+        """The library and its version, as the evidence names them first: `pinocchio 4.1.0`; empty if it names none."""
+        match = re.search(r"[\w.-]+ [0-9]+(?:\.[0-9]+)+", self.evidence)
+        return match[0] if match else ""
+
+
+@dataclass(frozen=True)
+class LintTrait(Trait):
+    """A trait that a finding of the lint makes matter.
+
+    Attributes:
+        on: the type of joint with which it matters; empty if the type makes no difference.
+    """
+
+    on: str = ""
+
+
+class Refusal(LintTrait):
+    """The engine refuses a URDF with this finding."""
+
+
+class Misreading(LintTrait):
+    """The engine reads a URDF with this finding otherwise than the specification says."""
+
 
 class Engine(ABC):
     """Forward kinematics of one description by one library.

@@ -9,7 +9,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from harness.description.urdf import UrdfText
-from harness.engines.base import Engine, Trait
+from harness.engines.base import Engine, Misreading, Refusal, Trait
+from harness.engines.refusals import refusals
 from harness.errors import EngineFailed
 from harness.se3 import Array
 
@@ -20,28 +21,43 @@ class UrdfDrake(Engine):
     source = "urdf:drake"
     requirements = ("drake>=1.51",)
     traits = (
-        Trait(
+        Misreading(
             "mimic-independent",
             "a mimic joint is an independent degree of freedom",
             "Drake 1.51.1 on a two-joint URDF: two positions; a follower stays at zero when only its leader is set",
             lint="mimic",
         ),
-        Trait(
+        Refusal(
             "no-fixed-mimic",
             "refuses a <mimic> on a fixed joint",
             "Drake 1.51.1 on a two-joint URDF, 'has 0 DOF cannot mimic'; 1.45.0 took it; four of example-robot-data's files",
-            lint="mimic",
+            lint="fixed-mimic",
         ),
-        Trait(
+        Misreading(
             "floating-free",
             "a floating joint is dropped: its child link is a free body, placed at the world's origin, not at the joint's",
             "Drake 1.51.1 on a two-joint URDF: 'not supported by MultibodyPlant. Leaving l2 as a free body', l2 at 0 0 0",
             lint="unsupported-joint",
+            on="floating",
         ),
         Trait(
             "joints-depth-first",
             "positions are ordered depth first, joints as written",
             "Drake 1.51.1: order jz1 jz2 ja1 ja2 for a file that writes jz1 ja1 jz2 ja2",
+        ),
+        *refusals(
+            "Drake 1.51.1",
+            {
+                "unnamed-robot": "'Your robot must have a name attribute or a model name must be specified.'",
+                "empty-name": "an assertion of model_instance.cc ends the program",
+                "limit-not-a-number": "'Expected single value for attribute effort'",
+                "limit-not-finite": "'Expected single value for attribute effort'",
+                "negative-velocity": "an assertion of its multibody tree ends the program",
+                "limits-reversed": "an assertion of its multibody tree ends the program",
+                "fixed-mimic-not-a-number": "'Expected single value for attribute multiplier'",
+                "fixed-mimic-not-finite": "'Expected single value for attribute multiplier'",
+                "unknown-mimic": "'Joint k mimic element specifies joint nobody which does not exist'",
+            },
         ),
     )
 

@@ -11,7 +11,8 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from harness.description.urdf import UrdfText
-from harness.engines.base import Engine, Trait
+from harness.engines.base import Engine, Misreading, Refusal, Trait
+from harness.engines.refusals import refusals
 from harness.errors import EngineFailed
 from harness.se3 import Array
 
@@ -34,13 +35,13 @@ class UrdfFrax(Engine):
             "links behind fixed joints are merged into their parents: no frame such as base_link or tool0 remains",
             "frax 0.1.0: of a UR5 with root `world` it has `world` and the six links that move",
         ),
-        Trait(
+        Misreading(
             "mimic-independent",
             "a mimic joint is an independent degree of freedom",
             "frax 0.1.0: a follower stays at zero when only its leader is set",
             lint="mimic",
         ),
-        Trait(
+        Refusal(
             "no-floating-planar",
             "floating joints raise NotImplementedError, planar ones Exception",
             "frax 0.1.0 on a one-joint URDF",
@@ -50,6 +51,24 @@ class UrdfFrax(Engine):
             "joints-breadth-first",
             "joints are ordered breadth first",
             "frax 0.1.0: order jz1 ja1 jz2 ja2",
+        ),
+        *refusals(
+            "frax 0.1.0",
+            {
+                "undeclared-prefix": "XMLSyntaxError, 'Namespace prefix drake for acceleration on limit is not defined'",
+                "default-namespace": "ValueError, 'Missing required subelement(s) of type Link'",
+                "unnamed-robot": "ValueError, 'Missing required attribute name'",
+                "limit-without-effort": "TypeError, float() of None",
+                "limit-without-velocity": "TypeError, float() of None",
+                "limit-not-a-number": "ValueError, 'could not convert string to float'",
+                "prismatic-without-limit": "ValueError, 'Require joint limit for prismatic and revolute joints'",
+                "revolute-without-limit": "ValueError, 'Require joint limit for prismatic and revolute joints'",
+                "fixed-axis-without-xyz": "KeyError, 'xyz'",
+                "fixed-axis-not-numbers": "ValueError, 'string or file could not be read to its end due to unmatched data'",
+                "fixed-limit-not-a-number": "ValueError, 'could not convert string to float'",
+                "fixed-mimic-not-a-number": "ValueError, 'could not convert string to float'",
+                "unknown-mimic": "ValueError, 'Joint k has an invalid mimic joint name nobody'",
+            },
         ),
     )
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from harness.description.urdf import UrdfText
-from harness.engines.base import Engine, Trait
+from harness.engines.base import Engine, Misreading, Refusal, Trait
 from harness.errors import EngineFailed
 from harness.se3 import Array
 
@@ -19,13 +19,13 @@ class UrdfIdyntree(Engine):
     # 14.0.0 turns three intersecting joints between massless links into one spherical joint, which misplaces links.
     requirements = ("idyntree>=15",)
     traits = (
-        Trait(
+        Misreading(
             "mimic-independent",
             "a mimic joint is an independent degree of freedom",
             "iDynTree 15.1.0 on a two-joint URDF: a follower stays at zero when only its leader is set",
             lint="mimic",
         ),
-        Trait(
+        Refusal(
             "no-floating-planar",
             "floating and planar joints are dropped, and the two trees that are left are refused",
             "iDynTree 15.1.0 on a two-joint URDF: an empty model, of which loadModelFromString says it is valid",

@@ -10,7 +10,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from harness.description.urdf import UrdfText
-from harness.engines.base import Engine, Trait
+from harness.engines.base import Engine, Misreading, Refusal, Trait
+from harness.engines.refusals import refusals
 from harness.errors import EngineFailed
 from harness.se3 import Array
 
@@ -31,29 +32,39 @@ class UrdfIkpy(Engine):
             "follows the first joint written below each link and loses the other branches",
             "ikpy 4.2.1: of the two branches jz1 jz2 and ja1 ja2 it has the first; a UR5 ends at ee_link",
         ),
-        Trait(
+        Misreading(
             "revolute-skewed",
             "the rotation about an axis that is not of unit length is not a rotation",
             "ikpy 4.2.1 on one-joint URDFs: axes 0 0 2 and 1 1 0 give a matrix that is not orthogonal",
             lint="unnormalised-axis",
+            on="revolute",
         ),
-        Trait(
+        Misreading(
             "prismatic-scaled",
             "the travel of a prismatic joint is multiplied by the length of its axis",
             "ikpy 4.2.1 on a one-joint URDF: axis 0 0 2 moves twice as far",
             lint="unnormalised-axis",
+            on="prismatic",
         ),
-        Trait(
+        Misreading(
             "mimic-independent",
             "a mimic joint is an independent degree of freedom",
             "ikpy 4.2.1 on a two-joint URDF: a follower stays at zero when only its leader is set",
             lint="mimic",
         ),
-        Trait(
+        Refusal(
             "no-floating-planar",
             "floating and planar joints on its chain raise ValueError",
             "ikpy 4.2.1 on a one-joint URDF",
             lint="unsupported-joint",
+        ),
+        *refusals(
+            "ikpy 4.2.1",
+            {
+                "undeclared-prefix": "ParseError, 'unbound prefix'",
+                "default-namespace": "ValueError: it finds no link",
+                "fixed-limit-not-a-number": "ValueError, 'could not convert string to float'",
+            },
         ),
     )
 

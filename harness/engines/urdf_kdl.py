@@ -7,7 +7,7 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 from harness.description.urdf import UrdfText
-from harness.engines.base import Trait
+from harness.engines.base import Misreading, Refusal, Trait
 from harness.engines.kdl_base import KdlEngine, cells, placements
 from harness.errors import EngineFailed
 from harness.se3 import Array
@@ -23,19 +23,19 @@ class UrdfKdl(KdlEngine):
 
     source = "urdf:kdl"
     traits = (
-        Trait(
+        Refusal(
             "missing-axis-refused",
             "a moving joint without <axis> is refused",
             "kdl_parser_py with urdf-parser-py 0.0.4 on a one-joint URDF: TypeError, the axis is None",
             lint="missing-axis",
         ),
-        Trait(
+        Misreading(
             "mimic-independent",
             "a mimic joint is an independent degree of freedom",
             "PyKDL 1.5.1: a follower stays at zero when only its leader is set",
             lint="mimic",
         ),
-        Trait(
+        Misreading(
             "floating-planar-fixed",
             "floating and planar joints become fixed joints",
             "PyKDL 1.5.1 with kdl_parser_py on a one-joint URDF: no joint, the link stays at the joint's origin",

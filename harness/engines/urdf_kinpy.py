@@ -9,7 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from harness.description.urdf import UrdfText
-from harness.engines.base import Engine, Trait
+from harness.engines.base import Engine, Misreading, Refusal, Trait
+from harness.engines.refusals import refusals
 from harness.errors import EngineFailed
 from harness.se3 import Array
 
@@ -20,25 +21,26 @@ class UrdfKinpy(Engine):
     source = "urdf:kinpy"
     requirements = ("kinpy>=0.6",)
     traits = (
-        Trait(
+        Misreading(
             "missing-axis-z",
             "a joint without <axis> moves along or turns about z; the specification says x",
             "kinpy 0.6.1 on a one-joint URDF",
             lint="missing-axis",
         ),
-        Trait(
+        Misreading(
             "prismatic-scaled",
             "the travel of a prismatic joint is multiplied by the length of its axis",
             "kinpy 0.6.1 on a one-joint URDF: axis 0 0 2 moves twice as far",
             lint="unnormalised-axis",
+            on="prismatic",
         ),
-        Trait(
+        Misreading(
             "mimic-independent",
             "a mimic joint is an independent degree of freedom",
             "kinpy 0.6.1 on a two-joint URDF: a follower stays at zero when only its leader is set",
             lint="mimic",
         ),
-        Trait(
+        Refusal(
             "no-floating-planar",
             "floating and planar joints raise KeyError",
             "kinpy 0.6.1 on a two-joint URDF",
@@ -48,6 +50,20 @@ class UrdfKinpy(Engine):
             "joints-depth-first",
             "joints are ordered depth first, not as written",
             "kinpy 0.6.1: order jz1 jz2 ja1 ja2 for a file that writes jz1 ja1 jz2 ja2",
+        ),
+        *refusals(
+            "kinpy 0.6.1",
+            {
+                "undeclared-prefix": "XMLSyntaxError, 'Namespace prefix drake for acceleration on limit is not defined'",
+                "default-namespace": "UnboundLocalError: it finds no link",
+                "limit-without-effort": "ParseError, 'Required attribute not set in XML: effort'",
+                "limit-without-velocity": "ParseError, 'Required attribute not set in XML: velocity'",
+                "limit-not-a-number": "ParseError, 'could not convert string to float'",
+                "fixed-axis-without-xyz": "AttributeError, 'NoneType' object has no attribute 'split'",
+                "fixed-axis-not-numbers": "ValueError, 'could not convert string to float'",
+                "fixed-limit-not-a-number": "ParseError, 'could not convert string to float'",
+                "fixed-mimic-not-a-number": "ParseError, 'could not convert string to float'",
+            },
         ),
     )
 

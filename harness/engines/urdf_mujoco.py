@@ -8,7 +8,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from harness.description.urdf import UrdfText
-from harness.engines.base import Engine, Trait
+from harness.engines.base import Engine, Misreading, Refusal, Trait
+from harness.engines.refusals import refusals
 from harness.errors import EngineFailed
 from harness.se3 import Array
 
@@ -22,17 +23,25 @@ class UrdfMujoco(Engine):
     source = "urdf:mujoco"
     requirements = ("mujoco>=3.3",)
     traits = (
-        Trait(
+        Misreading(
             "mimic-independent",
             "a mimic joint is an independent degree of freedom: the equality made of it acts on the dynamics only",
             "MuJoCo 4.0.0 on a two-joint URDF: a follower stays at zero when only its leader is set; google-deepmind/mujoco#3527",
             lint="mimic",
         ),
-        Trait(
+        Refusal(
             "no-floating-planar",
-            "a floating joint is refused except at the top level; a planar joint becomes three joints, left at zero",
-            "MuJoCo 4.0.0 on a two-joint URDF: 'free joint can only be used on top level'; joints off_TX, off_TY, off_RZ",
+            "a floating joint is refused except at the top level",
+            "MuJoCo 4.0.0 on a two-joint URDF: 'free joint can only be used on top level'",
             lint="unsupported-joint",
+            on="floating",
+        ),
+        Misreading(
+            "planar-three-joints",
+            "a planar joint becomes three joints, which stay at zero",
+            "MuJoCo 4.0.0 on a two-joint URDF: joints off_TX, off_TY, off_RZ",
+            lint="unsupported-joint",
+            on="planar",
         ),
         Trait(
             "world-is-the-root",
@@ -43,6 +52,14 @@ class UrdfMujoco(Engine):
             "joints-depth-first",
             "joints are ordered depth first, not as written",
             "MuJoCo 4.0.0: order jz1 jz2 ja1 ja2 for a file that writes jz1 ja1 jz2 ja2",
+        ),
+        *refusals(
+            "MuJoCo 4.0.0",
+            {
+                "limit-not-a-number": "'bad format in attribute effort'",
+                "fixed-axis-without-xyz": "'required attribute missing: xyz'",
+                "fixed-axis-not-numbers": "'bad format in attribute xyz'",
+            },
         ),
     )
 

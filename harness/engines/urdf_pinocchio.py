@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from harness.description.urdf import UrdfText
-from harness.engines.base import Trait
+from harness.engines.base import Misreading
 from harness.engines.pinocchio_base import PinocchioEngine
+from harness.engines.refusals import URDFDOM, refusals
 from harness.errors import EngineFailed
 
 
@@ -14,11 +15,19 @@ class UrdfPinocchio(PinocchioEngine):
     source = "urdf:pinocchio"
     traits = (
         *PinocchioEngine.traits,
-        Trait(
+        Misreading(
             "mimic-independent",
             "mimic joints are independent degrees of freedom unless mimic=True is asked for",
             "pinocchio 4.1.0: a follower stays at zero when only its leader is set; stack-of-tasks/pinocchio#2753",
             lint="mimic",
+        ),
+        *refusals(
+            "pinocchio 4.1.0",
+            {
+                **dict.fromkeys(URDFDOM, "'The XML stream does not contain a valid URDF model.'"),
+                "negative-effort": "'Some components of min_effort are greater than max_effort'",
+                "negative-velocity": "'Some components of min_velocity are greater than max_velocity'",
+            },
         ),
     )
 

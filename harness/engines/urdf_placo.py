@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from harness.description.urdf import UrdfText
-from harness.engines.base import Engine, Trait
+from harness.engines.base import Engine, Misreading, Trait
+from harness.engines.refusals import URDFDOM, refusals
 from harness.errors import EngineFailed
 from harness.se3 import Array
 
@@ -19,7 +20,7 @@ class UrdfPlaco(Engine):
     source = "urdf:placo"
     requirements = ("placo>=0.10",)
     traits = (
-        Trait(
+        Misreading(
             "mimic-independent",
             "a mimic joint is an independent degree of freedom",
             "placo 0.10.2: a follower stays at zero when only its leader is set",
@@ -39,6 +40,12 @@ class UrdfPlaco(Engine):
             "shared-names-lost",
             "a link that has the name of a joint cannot be asked for",
             "placo 0.10.2 on a one-joint URDF with joint l1 and link l1: get_T_world_frame raises ValueError",
+        ),
+        *refusals(
+            "placo 0.10.2",
+            {
+                **dict.fromkeys(URDFDOM, "'The XML stream does not contain a valid URDF model.'"),
+            },
         ),
     )
 

@@ -10,7 +10,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from harness.description.urdf import UrdfText
-from harness.engines.base import Engine, Trait
+from harness.engines.base import Engine, Misreading, Refusal, Trait
+from harness.engines.refusals import refusals
 from harness.errors import EngineFailed
 from harness.se3 import Array
 
@@ -27,25 +28,39 @@ class UrdfPytorchKinematics(Engine):
             "joint origins are built in float32 even when the chain is float64: 1e-8 to 4e-8 a joint",
             "pytorch-kinematics 0.10.0 on one-joint URDFs; torch.set_default_dtype does not help",
         ),
-        Trait(
+        Misreading(
             "missing-axis-z",
             "a joint without <axis> turns about z; the specification says x",
             "pytorch-kinematics 0.10.0 on a one-joint URDF",
             lint="missing-axis",
         ),
-        Trait(
+        Misreading(
             "mimic-independent",
             "a mimic joint is an independent degree of freedom",
             "pytorch-kinematics 0.10.0: a follower stays at zero when only its leader is set",
             lint="mimic",
         ),
-        Trait(
+        Refusal(
             "no-floating-planar",
             "floating and planar joints raise KeyError",
             "pytorch-kinematics 0.10.0 on a one-joint URDF",
             lint="unsupported-joint",
         ),
         Trait("joints-depth-first", "joints are ordered depth first, not as written", "order jz1 jz2 ja1 ja2"),
+        *refusals(
+            "pytorch-kinematics 0.10.0",
+            {
+                "undeclared-prefix": "XMLSyntaxError, 'Namespace prefix drake for acceleration on limit is not defined'",
+                "default-namespace": "UnboundLocalError: it finds no link",
+                "limit-without-effort": "ParseError, 'Required attribute not set in XML: effort'",
+                "limit-without-velocity": "ParseError, 'Required attribute not set in XML: velocity'",
+                "limit-not-a-number": "ParseError, 'could not convert string to float'",
+                "fixed-axis-without-xyz": "AttributeError, 'NoneType' object has no attribute 'split'",
+                "fixed-axis-not-numbers": "ValueError, 'could not convert string to float'",
+                "fixed-limit-not-a-number": "ParseError, 'could not convert string to float'",
+                "fixed-mimic-not-a-number": "ParseError, 'could not convert string to float'",
+            },
+        ),
     )
 
     def __init__(self, description: UrdfText) -> None:

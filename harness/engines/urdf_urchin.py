@@ -10,6 +10,7 @@ import numpy as np
 
 from harness.description.urdf import UrdfText
 from harness.engines.base import Engine, Trait
+from harness.engines.refusals import refusals
 from harness.errors import EngineFailed
 from harness.se3 import Array
 
@@ -37,6 +38,23 @@ class UrdfUrchin(Engine):
             "an axis shorter than 1e-4 is taken for a missing one: x",
             "urchin 0.0.30 on a one-joint URDF: axis 0 0 1e-5 turns about x",
             lint="unnormalised-axis",
+        ),
+        *refusals(
+            "urchin 0.0.30",
+            {
+                "undeclared-prefix": "XMLSyntaxError, 'Namespace prefix drake for acceleration on limit is not defined'",
+                "default-namespace": "NetworkXPointlessConcept: it finds no link",
+                "limit-without-effort": "ValueError, 'Missing required attribute effort'",
+                "limit-without-velocity": "ValueError, 'Missing required attribute velocity'",
+                "limit-not-a-number": "ValueError, 'Missing required attribute effort'",
+                "prismatic-without-limit": "ValueError, 'Require joint limit for prismatic and revolute joints'",
+                "revolute-without-limit": "ValueError, 'Require joint limit for prismatic and revolute joints'",
+                "fixed-axis-without-xyz": "KeyError, 'xyz'",
+                "fixed-axis-not-numbers": "ValueError, 'string or file could not be read to its end due to unmatched data'",
+                "fixed-limit-not-a-number": "ValueError, 'could not convert string to float'",
+                "fixed-mimic-not-a-number": "ValueError, 'could not convert string to float'",
+                "unknown-mimic": "ValueError, 'Joint k has an invalid mimic joint name nobody'",
+            },
         ),
     )
 

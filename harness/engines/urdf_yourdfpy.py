@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from harness.description.urdf import UrdfText
-from harness.engines.base import Engine, Trait
+from harness.engines.base import Engine, Misreading, Trait
+from harness.engines.refusals import refusals
 from harness.errors import EngineFailed
 from harness.se3 import Array
 
@@ -19,11 +20,12 @@ class UrdfYourdfpy(Engine):
     source = "urdf:yourdfpy"
     requirements = ("yourdfpy>=0.0.56",)
     traits = (
-        Trait(
+        Misreading(
             "prismatic-scaled",
             "the travel of a prismatic joint is multiplied by the length of its axis",
             "yourdfpy 0.0.60 on a one-joint URDF: axis 0 0 2 moves twice as far",
             lint="unnormalised-axis",
+            on="prismatic",
         ),
         Trait(
             "mimic-applied",
@@ -31,11 +33,27 @@ class UrdfYourdfpy(Engine):
             "yourdfpy 0.0.60 on a two-joint URDF",
             lint="mimic",
         ),
-        Trait(
-            "no-floating-planar",
-            "loads floating and planar joints, then update_cfg raises",
-            "yourdfpy 0.0.60 on a one-joint URDF",
+        Misreading(
+            "floating-planar-fixed",
+            "floating and planar joints stay at their origin, whatever value they are given",
+            "yourdfpy 0.0.60 on one- and two-joint URDFs: update_cfg takes one value for them, and the link does not move",
             lint="unsupported-joint",
+        ),
+        Misreading(
+            "default-namespace-empty",
+            "finds no link and no joint in a <robot> in a default namespace",
+            "yourdfpy 0.0.60 on a one-joint URDF: an empty model",
+            lint="default-namespace",
+        ),
+        *refusals(
+            "yourdfpy 0.0.60",
+            {
+                "unnamed-robot": "KeyError, 'name'",
+                "limit-not-a-number": "ValueError, 'could not convert string to float'",
+                "fixed-axis-not-numbers": "ValueError, 'could not convert string to float'",
+                "fixed-limit-not-a-number": "ValueError, 'could not convert string to float'",
+                "fixed-mimic-not-a-number": "ValueError, 'could not convert string to float'",
+            },
         ),
     )
 

@@ -9,6 +9,7 @@ from datetime import datetime, timezone
 from harness import se3
 from harness.description.configurations import Configuration
 from harness.description.published import Published
+from harness.engines.lint_traits import messages
 from harness.report import document as doc
 from harness.run.outcome import Run
 from harness.verdict.accepted import AcceptedNumbers, since
@@ -164,8 +165,8 @@ def _published(run: Run, configuration: Configuration, claim: Published) -> doc.
 
 def _lint(run: Run) -> list[doc.Lint]:
     found = [
-        doc.Lint(code=f.code, level=f.level, subject=f.subject, message=f"URDF line {f.line}: {f.message}")
-        for f in run.model.findings
+        doc.Lint(code=f.code, level=f.level, subject=f.subject, message=f"URDF line {f.line}: {message}")
+        for f, message in zip(run.model.findings, messages(run.model.findings), strict=True)
     ]
     found += [
         doc.Lint(code="suspect-number", level="warning", subject=s.where, message=f"{s.where}: {s.why}")

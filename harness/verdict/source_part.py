@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from typing import TypedDict
 
-from harness.engines.base import Trait
+from harness.engines.base import Refusal, Trait
 from harness.engines.registry import adapter_of
 from harness.errors import CrosscheckError, EngineUnavailable, InputError
 from harness.report import document as doc
@@ -113,7 +113,7 @@ def _compared(run: Run, outcome: Outcome, traits: list[parts.TraitNote]) -> _Res
         "first_disagreeing_frame": failing[0].frame if failing else "",
         "noise": noise.key,
         "noise_text": noise.text,
-        "explained_by": _evidence(run, traits, noise),
+        "explained_by": _evidence(run, _recorded(outcome.name), traits, noise),
         "explanation": explanation(outcome.explained),
         "reproducer": reproducer(run, outcome),
         "pose": pose(run, outcome),
@@ -135,15 +135,18 @@ def _validity(run: Run, outcome: Outcome, bound: Bound) -> parts.Validity:
     )
 
 
-def _traits(run: Run, source: str) -> list[parts.TraitNote]:
+def _recorded(source: str) -> tuple[Trait, ...]:
     try:
-        traits: tuple[Trait, ...] = adapter_of(source).traits
+        return adapter_of(source).traits
     except CrosscheckError:  # a broken adapter has none to show; its problem is the source's reason
-        return []
+        return ()
+
+
+def _traits(run: Run, source: str) -> list[parts.TraitNote]:
     codes = {finding.code for finding in run.model.findings}
     return [
         parts.TraitNote(key=t.key, text=t.text, evidence=t.evidence, lint=t.lint or "", applies=t.lint is None or t.lint in codes)
-        for t in traits
+        for t in _recorded(source)
     ]
 
 
@@ -166,7 +169,7 @@ def _given(bound: Bound | None) -> _Given:
     return given
 
 
-def _evidence(run: Run, traits: list[parts.TraitNote], noise: NoiseClass) -> list[str]:
+def _evidence(run: Run, recorded: tuple[Trait, ...], traits: list[parts.TraitNote], noise: NoiseClass) -> list[str]:
     """What is known about this engine or this URDF that would make a discrepancy of this class."""
     evidence = [t.text for t in traits if t.applies and noise.key == "float32" and t.key.startswith("float32")]
     if noise.key.startswith("pi-"):
@@ -175,5 +178,6 @@ def _evidence(run: Run, traits: list[parts.TraitNote], noise: NoiseClass) -> lis
             evidence.append(f"the URDF writes pi short in {len(cut)} places: {cut[0].message}")
         evidence += [s.why for s in run.model.suspects]
     if noise.key == "model":
-        evidence += [t.text for t in traits if t.applies and t.lint]
+        refusals = {t.key for t in recorded if isinstance(t, Refusal)}  # an engine that gave placements has not refused
+        evidence += [t.text for t in traits if t.applies and t.lint and t.key not in refusals]
     return evidence

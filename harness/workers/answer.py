@@ -16,6 +16,10 @@ from harness.workers import protocol
 LONGEST_TEXT = 2000
 
 
+class RefusedError(ValueError):
+    """The worker does not take the description; the text is its own reason."""
+
+
 class Answer(BaseModel):
     """A worker's answer to the greeting. Unknown keys are let through: a later version may have more.
 
@@ -84,7 +88,8 @@ def read_answer(source: str, text: bytes) -> Answer:
         text: the line.
 
     Raises:
-        ValueError: the answer is wrong, or the worker refused; the text says what, or the worker's own reason.
+        ValueError: the answer is wrong; the text says what.
+        RefusedError: the worker does not take the description.
         EngineUnavailable: the worker says that its library is not installed.
     """
     message = parsed(text)
@@ -99,7 +104,7 @@ def read_answer(source: str, text: bytes) -> Answer:
             raise ValueError(f'refused, but not why: expected {{"error": "why"}}, got {text[:60].decode(errors="replace")!r}')
         if message.get("unavailable") is True:
             raise EngineUnavailable(source, reason)
-        raise ValueError(reason)
+        raise RefusedError(reason)
     try:
         json.dumps(message, ensure_ascii=False).encode()
         return Answer.model_validate(message)

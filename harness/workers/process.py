@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.engines.base import Engine
-from harness.errors import EngineFailed, InputError
+from harness.errors import EngineFailed, EngineRefused, InputError
 from harness.se3 import Array
 from harness.workers import protocol
-from harness.workers.answer import Answer, error_text, explain_count, parsed, read_answer
+from harness.workers.answer import Answer, RefusedError, error_text, explain_count, parsed, read_answer
 from harness.workers.child import Child, ChildError
 
 
@@ -67,6 +67,7 @@ class ProcessEngine(Engine):
 
         Raises:
             EngineUnavailable: its library is not installed.
+            EngineRefused: its library does not take the description.
             EngineFailed: it ended, did not answer in time, or its answer is wrong.
         """
         self.source = source
@@ -93,7 +94,8 @@ class ProcessEngine(Engine):
             return read_answer(self.source, text)
         except ValueError as error:
             self.child.kill()
-            raise EngineFailed(self.source, f"{error}{self.child.last_words()}") from error
+            failed = EngineRefused if isinstance(error, RefusedError) else EngineFailed
+            raise failed(self.source, f"{error}{self.child.last_words()}") from error
 
     def finish(self, timeout: float) -> int | None:
         """Let it end by itself, and wait for `timeout` [s]. Returns its exit code, None if it goes on."""

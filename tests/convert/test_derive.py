@@ -248,6 +248,43 @@ def test_derive_dh_refuses_in_one_line(cli: Cli, args: tuple[str, ...], message:
     assert re.search(message, line), line
 
 
+REFUSED = """<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='revolute'><parent link='a'/><child link='b'/>
+<axis xyz='0 0 1'/>LIMIT</joint></robot>"""
+
+
+@pytest.mark.parametrize(
+    ("limit", "reason"),
+    [
+        ("<limit lower='-1' upper='1' velocity='1'/>", "joint 'j': <limit> has no attribute 'effort'"),
+        ("", "joint 'j': revolute without a <limit>"),
+        ("<limit lower='-1' upper='1' effort='-1' velocity='1'/>", "joint 'j': <limit> has a negative effort"),
+    ],
+)
+def test_a_file_that_the_engine_refuses_is_one_line_with_the_reason(cli: Cli, tmp_path: Path, limit: str, reason: str) -> None:
+    """Pinocchio's own lines on stderr do not reach the terminal."""
+    (tmp_path / "arm.urdf").write_text(REFUSED.replace("LIMIT", limit))
+    result = cli("derive-dh", "arm.urdf")
+    assert result.returncode == 2
+    expected = f"error: arm.urdf:1: urdf:pinocchio refuses the file: {reason}; choose another --source, or mend the file\n"
+    assert result.stderr == expected
+    assert result.stdout == ""
+
+
+def test_a_refusal_that_no_trait_knows_has_the_words_of_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "arm.urdf").write_text(REFUSED.replace("LIMIT", ""))
+    monkeypatch.setattr("harness.convert.derive.refused_for", lambda *_: None)
+    with pytest.raises(UrdfError, match=r"urdf:pinocchio: buildModelFromXML refused the URDF: .*; stderr ends: ") as refused:
+        derive(read_urdf(tmp_path / "arm.urdf"), "a", "b", "standard", "urdf:pinocchio")
+    assert "\n" not in str(refused.value)
+
+
+def test_a_follower_without_a_leader_is_refused_on_the_chain(tmp_path: Path) -> None:
+    limit = "<limit lower='-1' upper='1' effort='1' velocity='1'/><mimic joint='nobody'/>"
+    (tmp_path / "arm.urdf").write_text(REFUSED.replace("LIMIT", limit))
+    with pytest.raises(UrdfError, match="joint 'j' mimics 'nobody', which does not exist"):
+        derive(read_urdf(tmp_path / "arm.urdf"), "a", "b", "standard", "urdf:pinocchio")
+
+
 @pytest.mark.parametrize("robot", ["humanoid_arm", "panda", "sixr", "stanford", "ur5"])
 def test_exported_urdfs_are_the_table(models: dict[str, RobotModel], tmp_path: Path, robot: str) -> None:
     """Out as a URDF and checked against the table it came from, every DH frame, for all configurations."""
