@@ -12,7 +12,7 @@ from typing import Literal, Protocol
 
 from pydantic import ValidationError
 
-from harness.errors import InputError
+from harness.errors import InputError, command_line
 from harness.report.document import GateVerdict, PublishedResult, Report, Robot, Settings, Source
 from harness.report.parts import NonNegative, Part
 from harness.report.regression import Changed, Moved, Quantity, Regression
@@ -112,7 +112,7 @@ def read_accepted(path: Path) -> AcceptedNumbers:
     try:
         return AcceptedNumbers.model_validate_json(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise InputError("nothing was accepted yet", where=path, hint=f"crosscheck accept {path.stem}") from None
+        raise InputError("nothing was accepted yet", where=path, hint=command_line(["crosscheck", "accept", path.stem])) from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"cannot be read: {getattr(error, 'strerror', None) or error}", where=path) from None
     except ValidationError as failure:
