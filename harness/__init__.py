@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from harness.description.model import RobotModel
     from harness.difference.identify import Identification
     from harness.difference.result import Difference
-    from harness.errors import CrosscheckError, EngineFailed, EngineUnavailable, InputError
+    from harness.errors import CrosscheckError, EngineFailed, EngineUnavailable, InputError, UntrustedError
     from harness.report.document import Report
     from harness.run.options import Options
     from harness.workers.process import Limits
@@ -44,7 +44,7 @@ _HOME = {
     "RobotModel": "harness.description.model",
     "Identification": "harness.difference.identify",
     "Difference": "harness.difference.result",
-    **dict.fromkeys(("CrosscheckError", "EngineFailed", "EngineUnavailable", "InputError"), "harness.errors"),
+    **dict.fromkeys(("CrosscheckError", "EngineFailed", "EngineUnavailable", "InputError", "UntrustedError"), "harness.errors"),
     "Report": "harness.report.document",
     "Options": "harness.run.options",
     "Limits": "harness.workers.process",
@@ -65,6 +65,7 @@ __all__ = [
     "Report",
     "RobotModel",
     "Session",
+    "UntrustedError",
     "crosscheck",
     "derive_dh",
     "diff",

@@ -29,6 +29,7 @@ class Options:
     in_process: engines run here, not in workers, for debugging.
     accepted: folder of the accepted numbers; None: the report does not say what moved since.
     strict: a discrepancy that grew since it was accepted fails.
+    trust: start the programs that a model's own model.toml names; without it, such a model raises UntrustedError.
 
     Raises InputError for numbers that cannot be.
     """
@@ -47,6 +48,7 @@ class Options:
     in_process: bool = False
     accepted: Path | None = None
     strict: bool = False
+    trust: bool = False
 
     def reproduced_by(self, command: str) -> Options:
         """The same options, with the command line that reproduces them."""
