@@ -28,7 +28,14 @@ if TYPE_CHECKING:
     from harness.difference.identify import Identification
     from harness.difference.result import Difference
     from harness.engines.forward import forward_kinematics
-    from harness.errors import CrosscheckError, DescriptionUnavailable, EngineFailed, EngineUnavailable, InputError
+    from harness.errors import (
+        CrosscheckError,
+        DescriptionUnavailable,
+        EngineFailed,
+        EngineUnavailable,
+        InputError,
+        UntrustedError,
+    )
     from harness.report.document import Report
     from harness.run.options import Options
     from harness.workers.process import Limits
@@ -46,7 +53,8 @@ _HOME = {
     "Difference": "harness.difference.result",
     "forward_kinematics": "harness.engines.forward",
     **dict.fromkeys(
-        ("CrosscheckError", "DescriptionUnavailable", "EngineFailed", "EngineUnavailable", "InputError"), "harness.errors"
+        ("CrosscheckError", "DescriptionUnavailable", "EngineFailed", "EngineUnavailable", "InputError", "UntrustedError"),
+        "harness.errors",
     ),
     "Report": "harness.report.document",
     "Options": "harness.run.options",
@@ -69,6 +77,7 @@ __all__ = [
     "Report",
     "RobotModel",
     "Session",
+    "UntrustedError",
     "crosscheck",
     "derive_dh",
     "diff",

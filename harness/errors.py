@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
+import shlex
 from bisect import bisect
 from collections.abc import Iterable
 from enum import IntEnum
@@ -80,6 +81,14 @@ class MappingError(ModelFileError):
     """frames.toml names something that does not exist, maps it twice, or leaves a needed one out."""
 
 
+class UntrustedError(InputError):
+    """A model folder names a program that the user has not allowed to start. Fields also: `command`, the words as they run."""
+
+    def __init__(self, problem: str, *, command: tuple[str, ...], where: str | PathLike[str], key: str, hint: str) -> None:
+        self.command = command
+        super().__init__(problem, where=where, key=key, hint=hint)
+
+
 class DescriptionUnavailable(CrosscheckError, RuntimeError):
     """The package that holds a model's URDF is not installed."""
 
@@ -111,6 +120,30 @@ class EngineFailed(CrosscheckError, RuntimeError):
 
 class EngineRefused(EngineFailed):
     """The library of an engine has read the description, and says why it does not take it."""
+
+
+def command_line(words: Iterable[str]) -> str:
+    """Words as one line that can be pasted into a shell: it takes the line apart into just these words, and runs nothing else.
+
+    What cannot be seen (control characters, line breaks, marks that turn the direction of the text) is written as an escape
+    in `$'...'`, as bash and zsh read it.
+    """
+    return " ".join(shlex.quote(word) if word.isprintable() else _escaped(word) for word in words)
+
+
+def _escaped(word: str) -> str:
+    def letter(c: str) -> str:
+        if c == "\\":
+            return "\\\\"
+        if c == "'":  # not with a backslash: for a shell that does not know $'...', the word would end here
+            return "\\x27"
+        if c.isprintable():
+            return c
+        if 0xDC80 <= ord(c) <= 0xDCFF:  # a byte of a file name that is no UTF-8
+            return f"\\x{ord(c) - 0xDC00:02x}"
+        return f"\\x{ord(c):02x}" if ord(c) < 0x80 else f"\\u{ord(c):04x}" if ord(c) < 0x10000 else f"\\U{ord(c):08x}"
+
+    return "$'" + "".join(letter(c) for c in word) + "'"
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -8,9 +8,9 @@ import click
 
 from harness import api
 from harness.cli.console import console
-from harness.cli.shared import accepted_option, complete_robots, folders_of, models_option
+from harness.cli.shared import accepted_option, complete_robots, folders_of, models_option, robot_words
 from harness.description.locate import default_models_dir
-from harness.errors import InputError
+from harness.errors import InputError, command_line
 from harness.rendering.files import prepare, write
 from harness.report.document import Report
 from harness.report.text import plain
@@ -29,7 +29,7 @@ def accept(robots: tuple[str, ...], models: Path | None, out: Path, accepted: Pa
     that is meant goes into model.toml, with its reason.
     """
     folder = models or default_models_dir()
-    reports = [_current(path, out) for path in folders_of(robots, folder)]
+    reports = [_current(path, models, out) for path in folders_of(robots, folder)]
     prepare(accepted)
     for report in reports:
         path = write(accepted / f"{report.robot.name}.json", accepted_text(accepted_from(report)))
@@ -38,10 +38,10 @@ def accept(robots: tuple[str, ...], models: Path | None, out: Path, accepted: Pa
     return 0
 
 
-def _current(folder: Path, out: Path) -> Report:
+def _current(folder: Path, models: Path | None, out: Path) -> Report:
     """The robot's report, if it is one of the files as they are now. Raises InputError."""
     model = api.load_model(folder)
-    path, again = out / f"{model.name}.json", f"crosscheck run {folder.name}"
+    path, again = out / f"{model.name}.json", command_line(["crosscheck", "run", *robot_words(folder, models)])
     if not path.exists():
         raise InputError("no report to accept", where=path, hint=again)
     report = api.read_report(path)

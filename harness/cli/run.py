@@ -23,11 +23,13 @@ from harness.cli.shared import (
     gathered,
     models_option,
     progress_bar,
+    robot_words,
     seconds,
 )
+from harness.cli.trust import allowed, trust_option
 from harness.description.locate import default_models_dir
 from harness.engines.registry import REFERENCE
-from harness.errors import ExitCode, InputError
+from harness.errors import ExitCode, InputError, command_line
 from harness.rendering.engine_table import show_engine_table
 from harness.rendering.files import prepare, write_index, write_report, write_summary
 from harness.rendering.terminal import show
@@ -78,6 +80,7 @@ class RunSettings:
     block_timeout: float
     memory_limit: float
     in_process: bool
+    trust: bool
     quiet: bool
     as_json: bool
 
@@ -100,6 +103,7 @@ class RunSettings:
             limits=Limits(self.start_timeout, self.block_timeout, self.memory_limit * 2**30),
             jobs=self.jobs,
             in_process=self.in_process,
+            trust=self.trust,
             accepted=self.accepted,
             strict=self.strict,
             resume=self.resume,
@@ -147,6 +151,7 @@ class RunSettings:
 @click.option("--block-timeout", type=seconds, default=Limits.block, show_default=True, help="Seconds for 4096 configurations.")
 @click.option("--memory-limit", type=Quantity(1e9), default=Limits.memory / 2**30, show_default=True, help="GiB for each engine.")
 @click.option("--in-process", is_flag=True, help="Run the engines in this process, for debugging: no limits hold.")
+@trust_option
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing but errors; the exit code tells.")
 @click.option("--json", "as_json", is_flag=True, help="Print each report as one line of JSON.")
 @gathered(RunSettings, "settings")
@@ -200,8 +205,9 @@ def _one(session: api.Session, folder: Path, settings: RunSettings, tally: Tally
         raise InputError(f"robot name {model.name!r} is also that of {tally.names[model.name]}", where=folder)
     tally.names[model.name] = folder
     command = _command(folder, settings.models, session.options)
+    options = allowed(model, session.options.reproduced_by(command), command, settings.silent)
     with progress_bar(model.name, settings.silent) as advance:
-        report = session.crosscheck(model, progress=advance, options=session.options.reproduced_by(command))
+        report = session.crosscheck(model, progress=advance, options=options)
     codes.append(report.verdict.exit_code)
     tally.reports.append(report)
     for work in (partial(write_report, report, settings.out), partial(write_summary, report), partial(_print, report, settings)):
@@ -220,10 +226,7 @@ def _show_total(tally: Tally, settings: RunSettings) -> None:
 
 def _command(folder: Path, models: Path | None, options: Options) -> str:
     """The command line that gives the same numbers, and the same verdict."""
-    inside = folder.parent == (models or default_models_dir())
-    words = ["crosscheck", "run", folder.name if inside else str(folder)]
-    if models is not None and inside:
-        words += ["--models", str(models)]
+    words = ["crosscheck", "run", *robot_words(folder, models)]
     for source in options.sources:
         words += ["--source", source]
     words += ["--all-engines"] if options.all_engines else []
@@ -235,7 +238,7 @@ def _command(folder: Path, models: Path | None, options: Options) -> str:
     flags = {"--no-certify": not options.certify, "--no-explain": not options.explain, "--strict": options.strict}
     words += [flag for flag, wanted in flags.items() if wanted]
     # A path need not be text; the report is.
-    return shlex.join(words).encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+    return command_line(words).encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
 
 def _print(report: Report, settings: RunSettings) -> None:

@@ -22,6 +22,7 @@ from harness.cli.console import console
 from harness.description.locate import default_models_dir, find_model, model_folders
 from harness.description.values import parse_number, shown
 from harness.engines.registry import registered
+from harness.errors import command_line
 from harness.report.text import plain
 from harness.verdict.accepted import FOLDER
 
@@ -87,9 +88,16 @@ def gathered(record: type[Any], parameter: str) -> Callable[[Command], Command]:
 
 
 def complete_robots(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Names of the robot models that begin like that."""
+    """Names of the robot models that begin like that.
+
+    The shell puts them on the command line as they are. So a name that would mean something to it is not offered.
+    """
     folders = model_folders(ctx.params.get("models") or default_models_dir())
-    return [CompletionItem(name) for name in folders if name.startswith(incomplete)]
+    return [CompletionItem(name) for name in folders if name.startswith(incomplete) and _is_plain_word(name)]
+
+
+def _is_plain_word(name: str) -> bool:
+    return command_line([name]) == name and not name.startswith("-")
 
 
 def complete_sources(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
@@ -102,6 +110,19 @@ def folders_of(robots: tuple[str, ...], models: Path) -> list[Path]:
     if not robots:
         return list(model_folders(models).values())
     return list(dict.fromkeys(find_model(robot, models) for robot in robots))
+
+
+def robot_words(folder: Path, models: Path | None) -> list[str]:
+    """The words of a command line that name a robot model, whatever its folder is called.
+
+    folder: its folder.
+    models: the folder of robot models that was asked for; None: those that come with the package.
+    """
+    inside = folder.parent == (models or default_models_dir()) and not folder.name.startswith("-")
+    if inside:
+        return [folder.name, *(["--models", str(models)] if models is not None else [])]
+    # With a slash it is a path and no name of a model that comes along, nor an option.
+    return [str(folder) if folder.is_absolute() or folder.parts[:1] == ("..",) else os.path.join(".", folder)]
 
 
 class Estimate:

@@ -20,6 +20,7 @@ from harness.errors import EngineFailed, EngineUnavailable
 from harness.report.text import plain
 from harness.run.binding import bind
 from harness.run.naming import wanted_frames
+from harness.run.trust import filled_in
 from harness.workers import protocol
 from harness.workers.conformance import Finding, examine
 from harness.workers.pool import Workers
@@ -49,12 +50,11 @@ def worker_check(command: tuple[str, ...], settings: WorkerCheckSettings) -> int
     """Check that a program speaks the worker protocol, and say what is wrong. Exit code 0 if nothing is, else 1."""
     name = settings.name
     model = api.load_model(settings.robot, models=settings.models)
-    words = [word.replace("{model}", str(model.folder.resolve())) for word in command]
     greeting = protocol.greeting(description_of(name, model), wanted_frames(name, model))
     first = "answers the greeting with one line of JSON"
     with Workers(Limits(settings.start_timeout, settings.block_timeout)) as workers:
         try:
-            engine = workers.start(name, words, greeting)
+            engine = workers.start(name, filled_in(command, model.folder), greeting)
         except (EngineFailed, EngineUnavailable) as error:
             return _show([Finding(first, error.reason)])
         turning = [_turns(joint, engine, model) for joint in engine.joints]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from importlib import metadata
 from pathlib import Path, PurePosixPath
 
@@ -15,6 +16,11 @@ def default_models_dir() -> Path:
     """models/ of the wheel (`harness/_data/models`) or, in a checkout, beside the package."""
     packaged = _PACKAGE / "_data" / "models"
     return packaged if packaged.is_dir() else _PACKAGE.parent / "models"
+
+
+def comes_with_the_package(folder: Path) -> bool:
+    """Whether this is the folder of a robot model that comes with the package."""
+    return folder.resolve().parent == default_models_dir().resolve()
 
 
 def model_folders(models: Path) -> dict[str, Path]:
@@ -67,7 +73,9 @@ def packaged_file(package: str, file: str, where: Path | None = None, key: str |
         raise ModelFileError(f"expected the name of an installed package, got {package!r}", where=where, key=key) from None
     except metadata.PackageNotFoundError:
         place = f"{where}: urdf.package: " if where else ""
-        raise DescriptionUnavailable(f"{place}{package} is not installed; pip install {package}") from None
+        # Only a name is offered for pasting: an option, an address or a path would install something else.
+        way_out = f"; pip install {package}" if re.fullmatch(r"[A-Za-z0-9](?:[A-Za-z0-9._-]*[A-Za-z0-9])?", package) else ""
+        raise DescriptionUnavailable(f"{place}{package} is not installed{way_out}") from None
     wanted = PurePosixPath(file).parts
     matches = [f for f in files if PurePosixPath(str(f)).parts[-len(wanted) :] == wanted]
     if len(matches) != 1:

@@ -20,7 +20,7 @@ from harness.report.explanation import Explanation
 from harness.report.model_parts import Link, ParameterPair
 from harness.report.sentences import change_of, changed_text, difference, for_all, moved_text
 from harness.report.source_parts import FrameResult
-from harness.report.text import degrees, metres, numbers, plain, point, quantity, radians
+from harness.report.text import degrees, metres, numbers, pasteable, plain, point, quantity, radians
 from harness.report.verdicts import Verdict
 
 # ColorBrewer YlOrBr: light to dark, told apart by the colour-blind, always with the number beside it.
@@ -48,7 +48,7 @@ def _environment() -> Environment:
     env.filters.update(
         metres=metres, radians=radians, numbers=numbers, colour=colour, for_all=for_all, quantity=quantity, difference=difference,
         change_of=change_of, moved=moved_text, changed=changed_text, apart=apart, point=point,
-        degrees=degrees,
+        degrees=degrees, pasteable=pasteable,
     )  # fmt: skip
     return env
 

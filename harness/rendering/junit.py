@@ -8,7 +8,7 @@ from harness.report.document import PublishedResult, Report, Source
 from harness.report.regression import Regression
 from harness.report.sentences import why, worsened
 from harness.report.source_parts import FrameResult
-from harness.report.text import metres, numbers, plain, radians
+from harness.report.text import metres, numbers, pasteable, plain, radians
 from harness.report.verdicts import Verdict
 
 
@@ -59,7 +59,7 @@ def _frame(report: Report, source: Source, frame: FrameResult) -> TestCase:
         r = source.reproducer
         lines.append(f"smallest reproducer, frame {r.frame}: q = {numbers(r.q, 17)}, {metres(r.position)}, {radians(r.rotation)}")
     lines += [f"why: {text.strip()}" for text in why(source)]
-    failure.text = "\n".join(plain(line) for line in [*lines, report.settings.command])
+    failure.text = "\n".join(plain(line) for line in [*lines, pasteable(report.settings.command)])
     case.result = [failure]
     return case
 
@@ -78,7 +78,7 @@ def _regression(report: Report, regression: Regression) -> TestCase:
     case = _case(report, f"nothing grew since {regression.accepted}", "regression")
     if lines := worsened(regression):
         failure = Failure(plain(lines[0]))
-        failure.text = "\n".join(plain(line) for line in [*lines, report.settings.command])
+        failure.text = "\n".join(plain(line) for line in [*lines, pasteable(report.settings.command)])
         case.result = [failure]
     return case
 

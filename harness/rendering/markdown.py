@@ -6,7 +6,7 @@ import re
 
 from harness.report.document import Report, Source
 from harness.report.sentences import changed_text, difference, for_all, moved_text, why
-from harness.report.text import metres, numbers, plain, radians
+from harness.report.text import metres, numbers, pasteable, plain, radians
 from harness.report.verdicts import Verdict
 
 _ENTITY = {"<": "&lt;", ">": "&gt;", "&": "&amp;"}
@@ -36,7 +36,7 @@ def render_markdown(report: Report) -> str:
         *_limited(_published(report), OTHERS),
         *_limited(_since(report), OTHERS),
         *_limited(_not_run(report), OTHERS),
-        f"Reproduce: {_code(report.settings.command)}",
+        f"Reproduce: {_code(pasteable(report.settings.command))}",
     ]
     return "\n".join(lines) + "\n"
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import shlex
 from collections.abc import Iterable
 
 # C0 and C1 controls, line separators and bidirectional overrides change more than their own letters; surrogates and
@@ -14,6 +15,18 @@ _CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069
 def plain(text: str) -> str:
     """`text` on one line, every control character replaced by U+FFFD: safe on a terminal and in XML."""
     return _CONTROL.sub("\ufffd", text.replace("\n", " ").replace("\t", " "))
+
+
+_WORD = r"""(?:[\w@%+=:,./-]|'[^']*'|"'"|\$'(?:[^'\\]|\\[^'])*')+"""
+_INERT = re.compile(rf"crosscheck(?: {_WORD})*", re.ASCII)
+
+
+def pasteable(command: str) -> str:
+    """A command line of `crosscheck`, as it is if every word is quoted that a shell would otherwise read as more than a word.
+
+    Any other text, from a report that somebody else has written, comes back as one quoted word: pasted, it runs nothing.
+    """
+    return command if not command or _INERT.fullmatch(command) else shlex.quote(command)
 
 
 def metres(x: float) -> str:

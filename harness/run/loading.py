@@ -16,6 +16,7 @@ from harness.run.naming import wanted_frames
 from harness.run.outcome import Outcome
 from harness.run.plan import Planned
 from harness.run.rigid import Offset, RigidOffsets, transforms
+from harness.run.trust import filled_in
 from harness.workers import protocol
 from harness.workers.pool import Workers
 
@@ -62,9 +63,8 @@ def _load(planned: Planned, model: RobotModel, workers: Workers) -> Engine:
     if not planned.command:
         adapter = adapter_of(planned.name)
         return workers.load(adapter, description_of(planned.name, model, adapter.takes), frames)
-    command = [word.replace("{model}", str(model.folder.resolve())) for word in planned.command]
     greeting = protocol.greeting(description_of(planned.name, model), frames)
-    return workers.start(planned.name, command, greeting, planned.folder)
+    return workers.start(planned.name, filled_in(planned.command, model.folder), greeting, planned.folder)
 
 
 def _check_frames(outcome: Outcome, model: RobotModel, is_reference: bool) -> None:

@@ -34,6 +34,7 @@ class Options:
     accepted: folder of the accepted numbers; None: the report does not say what moved since.
     strict: a discrepancy that grew since it was accepted fails.
     resume: a long run keeps a checkpoint where its session says, and continues one that was interrupted.
+    trust: start the programs that a model's own model.toml names; without it, such a model raises UntrustedError.
 
     Raises InputError for numbers that cannot be.
     """
@@ -53,6 +54,7 @@ class Options:
     accepted: Path | None = None
     strict: bool = False
     resume: bool = True
+    trust: bool = False
 
     def reproduced_by(self, command: str) -> Options:
         """The same options, with the command line that reproduces them."""
@@ -82,7 +84,7 @@ class Options:
             if isinstance(value, bool) or not isinstance(value, Integral):
                 raise InputError(f"expected a whole number, got {value!r}", key=name)
             object.__setattr__(self, name, int(value))
-        for name in ("certify", "explain", "all_engines", "in_process", "strict"):
+        for name in ("certify", "explain", "all_engines", "in_process", "strict", "resume", "trust"):
             if not isinstance(value := getattr(self, name), bool):
                 raise InputError(f"expected True or False, got {value!r}", key=name)
         if not isinstance(self.limits, Limits):

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import fnmatch
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 
+from harness.description.locate import comes_with_the_package
 from harness.description.model import RobotModel
 from harness.description.model_file import Tolerance
 from harness.engines.registry import REFERENCE, adapter_of, kind_of, registered
 from harness.errors import EngineUnavailable, InputError, MappingError, nearest
 from harness.run.options import Options
+from harness.run.trust import Program, check_allowed, filled_in
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,8 +40,39 @@ def plan(model: RobotModel, options: Options) -> list[Planned]:
     """The reference first, then the sources of model.toml or those chosen, the commands given, and all engines if asked.
 
     Chosen ones and commands are required; an engine that model.toml does not list is not. Raises InputError for an unknown
-    source, or if nothing is left to compare.
+    source, or if nothing is left to compare; UntrustedError for a program of model.toml that `options.trust` does not allow.
     """
+    planned = _planned(model, options)
+    if not options.trust:
+        check_allowed(_own_programs(model, planned))
+    return planned
+
+
+def programs(model: RobotModel, options: Options) -> list[Program]:
+    """The programs of the model's own folder that such a run starts, allowed or not. Raises InputError, as `plan` does."""
+    return _own_programs(model, plan(model, replace(options, trust=True)))
+
+
+def _own_programs(model: RobotModel, planned: Sequence[Planned]) -> list[Program]:
+    """Those that nobody but model.toml names. A model that comes with the package is no stranger's."""
+    if comes_with_the_package(model.folder):
+        return []
+    entries = [entry.name for entry in model.file.source]
+    return [
+        Program(
+            source=source.name,
+            key=f"source[{entries.index(source.name)}].command",
+            written=source.command,
+            command=filled_in(source.command, model.folder),
+            folder=model.folder.resolve(),
+            urdf=model.urdf.path if model.urdf else None,
+        )
+        for source in planned
+        if source.command and source.folder is not None
+    ]
+
+
+def _planned(model: RobotModel, options: Options) -> list[Planned]:
     entries = {entry.name: entry for entry in model.file.source}
     commands = {**{e.name: tuple(e.command) for e in entries.values() if e.command}, **dict(options.workers)}
     asked = [options.reference, *options.sources, *dict(options.workers)]

@@ -13,7 +13,7 @@ from typing import Literal, Protocol
 
 from pydantic import ValidationError
 
-from harness.errors import InputError
+from harness.errors import InputError, command_line
 from harness.reading import MODEL_BYTES, parsed_json, read_text
 from harness.report.document import GateVerdict, PublishedResult, Report, Robot, Settings, Source
 from harness.report.parts import NonNegative, Part
@@ -112,7 +112,7 @@ def accepted_text(numbers: AcceptedNumbers) -> str:
 def read_accepted(path: Path) -> AcceptedNumbers:
     """Read the numbers on file. Raises InputError if there are none, or they cannot be read."""
     if not os.path.lexists(path):
-        raise InputError("nothing was accepted yet", where=path, hint=f"crosscheck accept {path.stem}")
+        raise InputError("nothing was accepted yet", where=path, hint=command_line(["crosscheck", "accept", path.stem]))
     data = parsed_json(read_text(path, MODEL_BYTES), path)
     try:
         return AcceptedNumbers.model_validate(data)

@@ -139,7 +139,9 @@ class Workers:
         if served is not None:
             with contextlib.suppress(EngineFailed):  # what it served before may have spoilt it: a new one then
                 return ProcessEngine(source, served, protocol.AGAIN + greeting, self.limits, adapter)
-        env = {**dict.fromkeys(THREAD_VARIABLES, "1"), **(own_environment(command[0]) if adapter else os.environ)}
+        # A program of the user's must not change its own folder: what is remembered of it is a hash over the files there.
+        own = own_environment(command[0]) if adapter else {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
+        env = {**dict.fromkeys(THREAD_VARIABLES, "1"), **own}
         try:
             with self._lock:
                 if self._closing.is_set():

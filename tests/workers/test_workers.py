@@ -130,7 +130,7 @@ def in_model_toml(copy_model: Callable[..., Path], fault: str, frames: str = "")
 
 def test_frames_that_a_program_does_not_have(models: dict[str, RobotModel], copy_model: Callable[..., Path]) -> None:
     """Given by hand, the verdict names them; in model.toml they must be declared; a reference must have all."""
-    options = {"samples": 10, "sources": ("dh:pinocchio", "controller"), "certify": False}
+    options = {"samples": 10, "sources": ("dh:pinocchio", "controller"), "certify": False, "trust": True}
     by_hand = with_fault(models["ur3"], "has the flange only", samples=10)
     assert "controller was compared without base, base_link, world, shoulder_link," in by_hand.verdict.sentence
     model = in_model_toml(copy_model, "has the flange only")
@@ -184,7 +184,7 @@ def test_an_optional_one_that_fails_does_not_fail_the_gate_and_is_named(copy_mod
     sources = f'[[source]]\nname = "controller"\nrequired = false\ncommand = ["{sys.executable}", "{WORKER}", "exits at once"]\n'
     text = (folder / "model.toml").read_text().split("[[source]]")[0]
     (folder / "model.toml").write_text(f'{text}{sources}[[source]]\nname = "dh:pinocchio"\n')
-    report = crosscheck(load_model(folder), Options(samples=100, certify=False))
+    report = crosscheck(load_model(folder), Options(samples=100, certify=False, trust=True))
     assert report.verdict.exit_code == 0
     assert "failed: controller" in report.verdict.sentence
     assert "no licence found" in named(report, "controller").reason
