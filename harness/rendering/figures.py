@@ -27,6 +27,7 @@ PATTERNS = ("", "/", "x", ".", "\\", "-", "|", "+")
 SEEN = 0.12  # of the arm's extent: how far apart a magnified difference is drawn
 TURNED = 0.6  # rad, likewise
 TRIAD_SIZE = 0.06
+DRAWN = 1e9  # the largest number in a placement that is drawn: squares of what an engine may return overflow
 BUDGET = 450_000  # bytes: with Plotly and the tables a report stays below 3 MB
 
 Figure = dict[str, Any]
@@ -40,7 +41,7 @@ def letters(text: str) -> str:
 def skeletons(report: Report) -> dict[str, Figure]:
     """For each source with a picture, by its place: traces as they are, and magnified by `factor` if too small to see.
 
-    Those that disagree come first; what would make the page larger than BUDGET is left out.
+    Those that disagree come first; what would make the page larger than BUDGET is left out, and what is too large to be drawn.
     """
     figures: dict[str, Figure] = {}
     order = {label.label: i for i, label in enumerate(report.trees.dh)}
@@ -50,6 +51,8 @@ def skeletons(report: Report) -> dict[str, Figure]:
         if source.pose is None:
             continue
         pairs = sorted(source.pose.frames, key=lambda f: rank[f.frame])
+        if not pairs or any(np.abs(T).max() > DRAWN for T in _placements(pairs)):
+            continue
         factor = _factor(pairs) if source.verdict is not Verdict.AGREES else 1.0
         figure = {
             "true": _traces(pairs, report.settings.reference, source.name, 1.0),
@@ -130,7 +133,9 @@ def _traces(pairs: Sequence[FramePair], reference: str, source: str, factor: flo
 def apart(pair: FramePair) -> str:
     """`0.301 mm, 1.1e-11 rad`: how far apart the two placements of a frame are."""
     T_a, T_b = np.array(pair.reference), np.array(pair.source)
-    return f"{metres(float(position_error(T_a, T_b)))}, {radians(float(rotation_error(T_a, T_b)))}"
+    with np.errstate(over="ignore"):  # an engine may return anything: infinitely far is how far it is
+        position, rotation = float(position_error(T_a, T_b)), float(rotation_error(T_a, T_b))
+    return f"{metres(position)}, {radians(rotation)}"
 
 
 def in_one_place(points: Array, gap: float) -> list[list[int]]:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
+from pydantic_core import PydanticSerializationError
 
 from harness.errors import InputError
 from harness.reading import REPORT_BYTES, parsed_json, read_text
@@ -38,9 +39,13 @@ def read_report(path: Path) -> Report:
             hint="run the cross-check again",
         )
     try:
-        return Report.model_validate(data)
+        report = Report.model_validate(data)
+        to_json(report)  # what cannot be written, a half of a surrogate pair, is refused here
+    except PydanticSerializationError:
+        raise InputError("not a report: it holds characters that are none", where=path) from None
     except ValidationError as failure:
         first = failure.errors(include_url=False)[0]
         key = ".".join(str(step) for step in first["loc"])
         problem = first["msg"].removeprefix("Value error, ")
         raise InputError(f"not a report: {problem}", where=path, key=key or None) from None
+    return report

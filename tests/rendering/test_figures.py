@@ -135,3 +135,22 @@ def test_what_is_drawn_has_a_budget(models: dict[str, RobotModel], monkeypatch: 
 def test_colours_grow_darker_with_the_exponent() -> None:
     assert len({colour(10.0**-k) for k in range(0, 17, 2)}) >= 7
     assert colour(0.0) == colour(1e-17)
+
+
+@pytest.mark.parametrize("huge", [1e10, 1e200, 1.7e308])
+@pytest.mark.filterwarnings("error")
+def test_what_is_too_large_to_be_drawn_is_left_out(models: dict[str, RobotModel], huge: float) -> None:
+    """An engine may return anything: its picture is not worth the report."""
+    report = crosscheck(models["sixr"], Options(samples=10, sources=("urdf:pinocchio",), certify=False))
+    source = report.sources[-1]
+    far = np.array(source.pose.frames[-1].source) if source.pose else np.eye(4)
+    far[0, 3], far[1, 1] = huge, -huge
+    frames = [FramePair(frame=f.frame, reference=f.reference, source=f.source) for f in source.pose.frames] if source.pose else []
+    frames[-1] = remade(frames[-1], source=far.tolist())
+    assert source.pose is not None
+    spoilt = remade(source, pose=remade(source.pose, frames=frames))
+    far_off = remade(report, sources=[*report.sources[:-1], spoilt])
+    assert list(skeletons(report)) == ["source-1"]
+    assert skeletons(far_off) == {}
+    assert "m, " in apart(frames[-1])
+    assert render_html(far_off).count("data-pose") >= 1

@@ -104,6 +104,7 @@ BROKEN: dict[str, tuple[Callable[[Document], object], str]] = {
     "an index of 300 digits": (lambda d: source(d)["pose"]["at"].update(index=10**300), "less than 9223372036854775808"),
     "samples of 300 digits": (lambda d: d["settings"].update(samples=10**300), "less than"),
     "a seed below zero": (lambda d: d["settings"].update(seed=-1), "greater than or equal to 0"),
+    "half a character": (lambda d: d["settings"].update(command="\ud800"), "characters that are none"),
     "a decade that is none": (lambda d: source(d)["frames"][0]["position"]["decades"].update(x=1), "match pattern"),
     "a decade of 400 digits": (lambda d: source(d)["frames"][0]["position"]["decades"].update({"1" * 400: 1}), "match pattern"),
     "counts below zero": (lambda d: source(d)["frames"][0]["position"].update(count=-1), "greater than or equal to 0"),
