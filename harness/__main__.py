@@ -21,6 +21,10 @@ def main() -> None:
     except KeyboardInterrupt:  # before the command could answer it
         sys.stderr.write("interrupted: reports written before are unchanged\n")
         sys.exit(INTERRUPTED)
+    finally:
+        # As it ends, Python gives Ctrl-C back to the system, where one more would end the process by a signal.
+        if signal.getsignal(signal.SIGINT) is _end:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:

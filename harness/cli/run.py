@@ -165,10 +165,18 @@ def run(settings: RunSettings) -> int:
     folders = folders_of(settings.robots, settings.models or default_models_dir())
     prepare(settings.out)
     tally = Tally()
-    others = [attempt(lambda: _each(folders, options, settings, tally)), attempt(lambda: write_index(settings.out))]
+    others = [attempt(lambda: _each(folders, options, settings, tally)), attempt(lambda: _write_index(settings))]
     if not settings.silent:
         others.append(attempt(lambda: _show_total(tally, settings)))
     return Kept(combined([*tally.codes, *others]))
+
+
+def _write_index(settings: RunSettings) -> None:
+    """Write the index. What it leaves out is told, unless nothing but errors is wanted."""
+    if settings.quiet:
+        write_index(settings.out, lambda line: None)
+    else:
+        write_index(settings.out)
 
 
 @dataclass

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from numbers import Integral
 from pathlib import Path
 
+from harness.description.values import shown
 from harness.engines.registry import REFERENCE
 from harness.errors import InputError
 from harness.workers.pool import Workers
@@ -68,11 +69,13 @@ class Options:
         """Refuse impossible values. Raises InputError."""
         self._check_types()
         if self.samples < 0:
-            raise InputError(f"expected samples >= 0, got {self.samples}")
+            raise InputError(f"expected samples >= 0, got {shown(self.samples)}")
+        if self.samples > MOST_SAMPLES:
+            raise InputError(f"expected samples <= {MOST_SAMPLES}, got {shown(self.samples)}")
         if not 0 <= self.seed < 2**64:
-            raise InputError(f"expected 0 <= seed < 2^64, got {self.seed}")
-        if self.jobs < 0:
-            raise InputError(f"expected jobs >= 0, got {self.jobs}")
+            raise InputError(f"expected 0 <= seed < 2^64, got {shown(self.seed)}")
+        if not 0 <= self.jobs <= MOST_JOBS:
+            raise InputError(f"expected jobs >= 0 and <= {MOST_JOBS}, got {shown(self.jobs)}")
 
     def _check_types(self) -> None:
         if self.accepted is not None:

@@ -107,7 +107,7 @@ def test_json_and_quiet(cli: Cli) -> None:
         (("runn",), "No such command 'runn'"),
         (("frames", "ur55"), "no robot model 'ur55'"),
         (("frames", "nowhere.urdf"), "nowhere.urdf: no such file"),
-        (("render", "nowhere.json"), "nowhere.json: cannot be read"),
+        (("render", "nowhere.json"), "nowhere.json: no such file"),
         (("completion", "tcsh"), "'tcsh' is not one of"),
     ],
 )
