@@ -98,7 +98,7 @@ def test_a_urdf_that_no_file_can_be(crosscheck: Callable[..., str], copy_model: 
 
 
 def test_a_package_without_a_name(crosscheck: Callable[..., str]) -> None:
-    assert "expected the name of an installed package, got ''" in crosscheck("diff", ":x.urdf", "sixr")
+    assert "expected PACKAGE:FILE.urdf, got ':x.urdf'" in crosscheck("diff", ":x.urdf", "sixr")
 
 
 def test_a_path_that_is_no_text(
