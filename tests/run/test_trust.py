@@ -60,15 +60,19 @@ def stranger(copy_model: Callable[..., Path], trace: Path) -> Path:
 
 
 @pytest.fixture
-def cli(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Cli:
+def cli(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Cli:
     """Run `crosscheck ARGS` here, without a terminal, in tmp_path; returns exit code and stderr."""
     monkeypatch.chdir(tmp_path)
 
     def run(*args: str) -> tuple[int, str]:
         monkeypatch.setattr(sys, "argv", ["crosscheck", *args])
-        with pytest.raises(SystemExit) as end:
-            main()
-        return int(end.value.code or 0), capsys.readouterr().err
+        streams = sys.stdout, sys.stderr
+        try:
+            with pytest.raises(SystemExit) as end:
+                main()
+        finally:
+            sys.stdout, sys.stderr = streams  # the command puts its own in their place
+        return int(end.value.code or 0), capfd.readouterr().err
 
     return run
 
