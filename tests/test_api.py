@@ -225,7 +225,7 @@ def table_of() -> harness.DHTable:
             lambda: harness.forward_kinematics(harness.load_model("ur5").table, [0] * 6, ["7"]),
             "no DH frame '7'; one of base",
         ),
-        (lambda: harness.read_report("no.json"), "no.json: cannot be read"),
+        (lambda: harness.read_report("no.json"), "no.json: no such file"),
         (lambda: harness.load_model("nothing"), "no robot model 'nothing'"),
         (lambda: harness.load_model(Path("nowhere")), "nowhere: no such robot model folder"),
         (lambda: harness.diff("ur5", ROWS, convention=WRONG), "convention: expected 'standard' or 'modified', got 'modifed'"),

@@ -30,9 +30,9 @@ def test_a_suggestion_takes_milliseconds_whatever_the_names() -> None:
         ("ab" * 50_000, ["ba" * 50_000 + str(i) for i in range(200)]),
         ("ab" * 40, ["ba" * 40 + str(i) for i in range(5000)]),
     ):
-        started = time.monotonic()
+        started = time.process_time()
         text = nearest(name, known)
-        assert time.monotonic() - started < 0.5
+        assert time.process_time() - started < 0.5
         assert len(text) < 250
 
 
@@ -44,11 +44,12 @@ def test_1300_misspelt_parents_and_leaders() -> None:
         for i in range(1300)
     )
     urdf = parse_urdf(f"<robot name='r'>{links}{joints}</robot>".encode(), Path("r.urdf"))
-    started = time.monotonic()
+    started = time.process_time()
     messages = [finding.message for finding in lint(urdf)]
-    assert time.monotonic() - started < 2.0
-    assert sum("did you mean" in message for message in messages) == Suggestions.MOST
-    assert any("does not exist; 1301 names are known" in message for message in messages)
+    assert time.process_time() - started < 2.0
+    # One message names the first of the links that do not exist; each leader has a message of its own.
+    assert sum("did you mean" in message for message in messages) == 1 + Suggestions.MOST
+    assert any("does not exist; 1300 names are known" in message for message in messages)
 
 
 def test_long_names_are_cut_in_messages() -> None:
