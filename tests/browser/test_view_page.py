@@ -46,7 +46,7 @@ def served(broken: Path) -> Iterator[tuple[str, int]]:
         assert found, line
         yield found[0], view.pid
         view.send_signal(signal.SIGINT)
-        assert view.wait(20) == 0
+        assert view.wait(60) == 0
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(view.pid, signal.SIGKILL)
