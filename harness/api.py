@@ -28,6 +28,7 @@ from harness.difference.result import Difference
 from harness.engines.registry import REFERENCE
 from harness.errors import InputError
 from harness.rendering import files
+from harness.rendering.index import to_stderr
 from harness.report.document import Report
 from harness.report.json_file import read_report as read_document
 from harness.run.checkpoint import Checkpoints
@@ -72,7 +73,7 @@ class Session:
         """
         self.options = _options(options)
         self._pool = self.options.worker_pool()
-        self._checkpoints = None if checkpoints is None else Checkpoints(Path(checkpoints))
+        self._checkpoints = None if checkpoints is None else Checkpoints(Path(checkpoints), to_stderr)
 
     def __enter__(self) -> Session:
         self._pool.__enter__()

@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from harness.cause.changes import amount
 from harness.description.dh import DHRow
 from harness.description.locate import model_folders
@@ -16,7 +14,7 @@ from harness.difference.reading import TOOLBOX, Ends, read_operand
 from harness.errors import CrosscheckError, EngineFailed, EngineUnavailable, ExitCode, InputError, shortened
 from harness.kinematics.canonical import canonical
 from harness.kinematics.invariants import Matching, ParameterDifference, match
-from harness.kinematics.screws import chain_screws, finite_steps
+from harness.kinematics.screws import chain_screws, step_configurations
 from harness.report.notebook import html_lines, html_table, text_table
 from harness.report.text import plain
 from harness.workers.packaged_tables import packaged_tables
@@ -127,9 +125,8 @@ def _size(difference: ParameterDifference | None) -> str:
 
 def rows_of(operand: Operand) -> tuple[DHRow, ...] | str:
     """Standard canonical rows of a mechanism, axes that are nearly parallel taken for parallel; or why there are none."""
-    n = len(operand.joints)
     mechanism = operand.recipe(operand.joints, {j: j for j in operand.joints}, False).mechanism
-    q = np.concatenate([np.zeros((1, n)), np.diag(finite_steps(operand.prismatic))])
+    q = step_configurations(operand.prismatic)
     prismatic = list(operand.prismatic)
     try:
         screws = chain_screws(mechanism.placements(q, (TIP,))[:, 0], prismatic)

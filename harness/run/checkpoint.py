@@ -13,7 +13,6 @@ import hmac
 import os
 import secrets
 import stat
-import sys
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -53,12 +52,6 @@ class State(Part):
     comparison: ComparisonState
 
 
-def to_stderr(line: str) -> None:
-    """Print one line on stderr, if there is one."""
-    if sys.stderr is not None:
-        print(line, file=sys.stderr)
-
-
 def digest_of(T: Array) -> str:
     """A digest of one in LOOKED_AT answers T (N, F, 4, 4) to a block."""
     return hashlib.sha256(T[::LOOKED_AT].tobytes()).hexdigest()
@@ -79,7 +72,7 @@ class _MisfitError(Exception):
 class Checkpoints:
     """The checkpoints of a session, in one folder. They go when all its runs are done."""
 
-    def __init__(self, folder: Path, tell: Callable[[str], None] = to_stderr) -> None:
+    def __init__(self, folder: Path, tell: Callable[[str], None]) -> None:
         self._folder, self._tell = folder, tell
         self._used: set[Path] = set()
 

@@ -13,7 +13,6 @@ import hashlib
 import json
 import os
 import stat
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ from pathlib import Path
 import platformdirs
 
 from harness.errors import UntrustedError, command_line
+from harness.writing import replace_file
 
 DATA = ("dh.csv", "model.toml", "frames.toml", "configurations.toml")
 VERSION_CONTROL = (".git", ".hg", ".svn")
@@ -153,11 +153,5 @@ def remember(mark: str, program: Program) -> None:
     """Keep that the user has allowed it: a file of its own (0600), there in full or not at all. Raises OSError."""
     folder = allowed_folder()
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=folder, prefix=".")  # O_EXCL, O_NOFOLLOW, 0600
-    try:
-        with open(handle, "w", encoding="utf-8") as file:
-            file.write(json.dumps({"folder": str(program.folder), "command": program.written}) + "\n")
-        os.replace(temporary, folder / mark)
-    except BaseException:
-        os.unlink(temporary)
-        raise
+    text = json.dumps({"folder": str(program.folder), "command": program.written}) + "\n"
+    replace_file(folder / mark, text, 0o600)

@@ -15,6 +15,7 @@ from harness.api import Session
 from harness.description.locate import default_models_dir
 from harness.description.model import RobotModel, load_model
 from harness.errors import EngineFailed
+from harness.rendering.index import to_stderr
 from harness.report.document import Report
 from harness.report.json_file import to_json
 from harness.run import checkpoint as module
@@ -326,7 +327,7 @@ def test_writing_costs_little(ur5: RobotModel, tmp_path: Path, monkeypatch: pyte
     monkeypatch.setattr(module, "_key", lambda make: b"key")
     with Workers(in_process=True) as workers:
         finished = run_robot(ur5, OPTIONS, None, workers)
-        checkpoint = Checkpoints(tmp_path).of(finished)
+        checkpoint = Checkpoints(tmp_path, to_stderr).of(finished)
         assert checkpoint.due
         assert finished.comparison is not None
         checkpoint.write(20018, finished.comparison, {"dh:numpy": np.eye(4)[None, None]})
