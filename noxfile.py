@@ -169,11 +169,12 @@ def types(session: nox.Session) -> None:
 
 @nox.session
 def bench(session: nox.Session) -> None:
-    """Speed and memory as ratios within one run, the start, 10 000 random certificates, derive-dh on every packaged chain."""
+    """Speed and memory as ratios within one run, the start, the theorem, 10 000 random bounds, derive-dh on every chain."""
     install(session, "tests")
     session.run("python", "bench/bench.py")
     session.run("python", "bench/startup.py")
     session.run("python", "bench/engines.py")
+    session.run("python", "bench/theorem.py")
     session.run("python", "bench/soundness.py", *(session.posargs or ["10000"]))
     session.run("python", "bench/derive_all.py")
 

@@ -26,7 +26,7 @@ FLOORS: dict[str, set[str]] = {
     "mutation": {"verdict", "run", "workers", "cause", "kinematics", "engines", "rendering", "report", "description"},
     "view": {"run", "workers", "kinematics", "rendering", "report", "description"},
     "convert": {"verdict", "run", "kinematics", "engines", "report", "description"},
-    "verdict": {"run", "workers", "cause", "kinematics", "comparison", "engines", "report", "description"},
+    "verdict": {"run", "workers", "cause", "theorem", "kinematics", "comparison", "engines", "report", "description"},
     "run": {"workers", "cause", "certificate", "theorem", "kinematics", "comparison", "engines", "description"},
     "difference": {"workers", "cause", "theorem", "kinematics", "report", "description"},
     "workers": {"engines", "description"},

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 
 from harness.report.document import Report, Source
-from harness.report.sentences import changed_text, difference, for_all, moved_text, why
+from harness.report.proven import for_all
+from harness.report.sentences import changed_text, difference, moved_text, why
 from harness.report.text import metres, numbers, pasteable, plain, radians
 from harness.report.verdicts import Verdict
 
@@ -26,7 +27,7 @@ def render_markdown(report: Report) -> str:
         f"{_md(report.robot.description)}. Reference {_code(report.settings.reference)}; {report.settings.fixed} fixed and "
         f"{report.settings.samples} random configurations, seed {report.settings.seed}.",
         "",
-        "| source | verdict | worst frame | position | rotation | for all q | tolerance | magnitude |",
+        "| source | verdict | worst frame | position | rotation | files, every q | tolerance | magnitude |",
         "|---|---|---|---|---|---|---|---|",
         *(_row(source) for source in ranked[:SOURCES]),
         *([f"| and {len(ranked) - SOURCES} more in the HTML report | | | | | | | |"] if len(ranked) > SOURCES else []),

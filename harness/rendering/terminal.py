@@ -7,7 +7,8 @@ from rich.text import Text
 
 from harness.rendering.tables import bare_table
 from harness.report.document import Report, Source
-from harness.report.sentences import changed_text, for_all, moved_text, why
+from harness.report.proven import for_all
+from harness.report.sentences import changed_text, moved_text, why
 from harness.report.text import metres, numbers, plain, radians
 from harness.report.verdicts import Verdict
 
@@ -22,7 +23,7 @@ def show(report: Report, console: Console) -> None:
     console.print(
         Text(report.verdict.word, style=_STYLE[report.verdict.exit_code]), Text(plain(report.verdict.sentence)), soft_wrap=True
     )
-    table = bare_table("source", "verdict", "worst frame", "position", "rotation", "for all q", "tolerance", "magnitude")
+    table = bare_table("source", "verdict", "worst frame", "position", "rotation", "files, every q", "tolerance", "magnitude")
     for source in report.sources:
         if not source.reference:
             table.add_row(*_row(source))
@@ -118,6 +119,6 @@ def _located(source: Source, reference: str, console: Console) -> None:
         console.print(Text(where), soft_wrap=True)
         console.print(Text(f"    {reference} has it at {p_a}, {source.name} at {p_b}"), soft_wrap=True)
     if source.certificate and source.certificate.status == "refused":
-        console.print(Text(f"    no certificate: {plain(source.certificate.reason)}"), soft_wrap=True)
+        console.print(Text(f"    nothing proven counts for it: {plain(source.certificate.reason)}"), soft_wrap=True)
     for text in source.explained_by:
         console.print(Text(f"    known: {plain(text)}"), soft_wrap=True)

@@ -15,8 +15,9 @@ from harness.report.model_parts import SideBySide, Trees
 from harness.report.notebook import html_lines, html_table, text_table
 from harness.report.parts import Configuration, Count, Finite, Matrix, NonNegative, Part, RobotName, Rotation, Vector
 from harness.report.pose import Pose
+from harness.report.proof_parts import Certificate, Theorem
 from harness.report.regression import Regression
-from harness.report.source_parts import Certificate, FrameResult, Reproducer, Tolerance, TraitNote, Validity
+from harness.report.source_parts import FrameResult, Reproducer, Tolerance, TraitNote, Validity
 from harness.report.text import metres, plain, radians
 from harness.report.verdicts import SourceVerdict
 
@@ -230,7 +231,7 @@ class Report(Part):
     """The whole document."""
 
     format: Literal["fk-crosscheck report"] = "fk-crosscheck report"
-    version: Literal["1.3"] = "1.3"
+    version: Literal["1.4"] = "1.4"
     robot: Robot
     settings: Settings
     verdict: GateVerdict
@@ -241,6 +242,7 @@ class Report(Part):
     parameters: SideBySide | None = None
     pairs: list[PairResult]
     published: list[PublishedResult]
+    theorem: Theorem | None = None
     lint: list[Lint]
     regression: Regression | None = None
     environment: Environment
@@ -251,6 +253,8 @@ class Report(Part):
         sources, frames = {s.name for s in self.sources}, {f.name for f in self.frames}
         _require((name for pair in self.pairs for name in (pair.a, pair.b)), sources, "source")
         _require((place for source in self.sources for place in source.places()), frames, "frame")
+        if self.theorem is not None:
+            self.theorem.require(frames, len(self.robot.joints))
         if any(len(q) != len(self.robot.joints) for source in self.sources for q in source.configurations()):
             raise ValueError(f"expected {len(self.robot.joints)} joint values in each configuration")
         return self

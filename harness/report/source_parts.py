@@ -5,9 +5,9 @@ Units are metres and radians.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from harness.report.parts import Configuration, Count, Matrix, NonNegative, Part
 from harness.report.verdicts import FrameVerdict
@@ -101,37 +101,3 @@ class Validity(Part):
     first_frame: str = ""
     again: NonNegative = 0.0
     again_at: At | None = None
-
-
-class FrameBound(Part):
-    """For every configuration: no discrepancy at this frame is above `upper`; `found` is the largest one seen."""
-
-    frame: str
-    position_upper: NonNegative
-    position_found: NonNegative
-    rotation_upper: NonNegative
-    rotation_found: NonNegative
-    method: str
-
-
-class Certificate(Part):
-    """Agreement for every angle of every revolute joint, and every prismatic joint within its range; or why there is none.
-
-    form: `grid` or `links`; nodes: configurations evaluated. residual, reference_residual: how far each engine is from the
-    interpolant of its own values at random configurations; limit: how far rounding explains.
-    """
-
-    status: Literal["certified", "refused"]
-    reason: str = ""
-    form: str = ""
-    nodes: Count = 0
-    residual: NonNegative | None = None
-    reference_residual: NonNegative | None = None
-    limit: NonNegative | None = None
-    frames: list[FrameBound] = []
-
-    @model_validator(mode="after")
-    def _certifies_something(self) -> Certificate:
-        if self.status == "certified" and not self.frames:
-            raise ValueError("expected a bound of at least one frame in a certificate")
-        return self

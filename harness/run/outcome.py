@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from harness.cause.explain import Explanation
-from harness.certificate.certify import Bounds
 from harness.comparison.compare import Comparison
 from harness.description.model import RobotModel
 from harness.errors import EngineFailed, EngineUnavailable
@@ -16,6 +15,8 @@ from harness.run.options import Options
 from harness.run.plan import Planned, pair_tolerance
 from harness.run.rigid import Offset, transforms
 from harness.se3 import Array
+from harness.theorem.prove import FrameBound
+from harness.theorem.statement import Theorem
 
 Status: TypeAlias = Literal["ran", "not run", "failed"]
 
@@ -54,27 +55,15 @@ class Worst:
 
 @dataclass(frozen=True, kw_only=True)
 class Certified:
-    """A source's certificate against the reference, or why it has none (`reason`).
+    """What is proven of the descriptions that a source and the reference read, or why it does not count (`reason`).
 
-    form: `grid` or `links`.
-    nodes: configurations evaluated.
-    residual, reference_residual: how far each engine is from its own interpolant.
-    limit: how far rounding explains.
-    frames: indices of the mapped frames certified.
-    bounds: the proven bounds there.
-    position_found, rotation_found: largest discrepancies seen there, (F,) [m], [rad].
+    frames: indices of the mapped frames.
+    bounds: the proven bounds there; None if nothing counts.
     """
 
     reason: str = ""
-    form: str = ""
-    nodes: int = 0
-    residual: float = 0.0
-    reference_residual: float = 0.0
-    limit: float = 0.0
     frames: Sequence[int] = ()
-    bounds: Bounds | None = None
-    position_found: Array | None = None
-    rotation_found: Array | None = None
+    bounds: tuple[FrameBound, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -139,6 +128,7 @@ class Run:
     in_house: the in-house FK, bound to the model.
     offsets: the measured offsets of rigid frames.
     comparison: discrepancies of all sources; None if the reference does not run.
+    theorem: what is proven of the table and the URDF; None if nothing was to be.
     seconds, loaded_in: time of the whole run, and until every engine was there [s].
     """
 
@@ -149,6 +139,7 @@ class Run:
     in_house: Bound
     offsets: dict[str, Offset] = field(default_factory=dict)
     comparison: Comparison | None = None
+    theorem: Theorem | None = None
     seconds: float = 0.0
     loaded_in: float = 0.0
 

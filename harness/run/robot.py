@@ -7,13 +7,13 @@ import time
 
 from harness.description.model import RobotModel
 from harness.errors import EngineFailed
-from harness.run.certifying import certify_all
 from harness.run.checkpoint import Checkpoints
 from harness.run.explaining import explain_all
 from harness.run.loading import load_all
 from harness.run.options import Options
 from harness.run.outcome import Run
 from harness.run.plan import plan
+from harness.run.proving import prove_all
 from harness.run.resuming import AnswersChangedError, resume
 from harness.run.streaming import Progress, compare
 from harness.run.worst import find_worst, reproduce
@@ -73,7 +73,7 @@ def run_robot(
             if options.explain:
                 explain_all(run)
             if options.certify:
-                certify_all(run, workers)
+                prove_all(run)
         _drop_dead(run)
         workers.settle(o.bound.engine for o in run.outcomes if o.bound is not None)
     run.seconds = time.perf_counter() - started

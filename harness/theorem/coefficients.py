@@ -50,6 +50,22 @@ class Coefficients:
         weight = np.where(self.frequencies.any(axis=1), 2.0, 1.0) * self._slides(q)
         return np.asarray((weight * np.cos(phase)) @ self.real - (weight * np.sin(phase)) @ self.imaginary)
 
+    def along(self, q: Array, joint: int, values: Array) -> Array:
+        """The function where one joint takes other values (V,) and all others stay at q (n,): (V, d)."""
+        own = self.frequencies[:, joint]
+        phase = np.exp(1j * ((self.frequencies / np.array(self.scales)) @ q - own / self.scales[joint] * q[joint]))
+        slides = np.where(self.linear == joint, 1.0, self._slides(q[None])[0])
+        weight = np.where(self.frequencies.any(axis=1), 2.0, 1.0) * slides
+        terms = (weight * phase)[:, None] * (self.real + 1j * self.imaginary)
+        out = np.zeros((len(values), terms.shape[1]))
+        for linear in (False, True):
+            for f in np.unique(own):
+                chosen = (own == f) & ((self.linear == joint) == linear)
+                if chosen.any():
+                    wave = np.exp(1j * (f / self.scales[joint]) * values) * (values if linear else 1.0)
+                    out += (wave[:, None] * terms[chosen].sum(axis=0)).real
+        return out
+
     def _slides(self, q: Array) -> Array:
         joint = np.where(self.linear < 0, 0, self.linear)
         return np.asarray(np.where(self.linear < 0, 1.0, q[:, joint]))

@@ -15,11 +15,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import flint
+import numpy as np
 
 from harness.theorem.balls import direction, precision
 from harness.theorem.chain import Chains, Path, Step
+from harness.theorem.pair import Pair
 from harness.theorem.polynomial import Polynomial, Terms, subtract
-from harness.theorem.scales import scales_of
 
 MOST_BITS = 16_000
 MOST_JOINTS = 8  # that turn: 3281 terms at a high precision
@@ -47,25 +48,36 @@ class Field:
         return self.degree * (self.denominator.bit_length() + top.bit_length() + 1)
 
 
-def equal(a: Chains, b: Chains) -> dict[str, bool | None]:
-    """For each frame that both have, whether both are the same function; None where the numbers do not let it be decided."""
-    scales = scales_of((a, b))
-    return {name: _equal((a.paths[name], b.paths[name]), scales) for name in a.paths if name in b.paths}
+def equal(a: Chains, b: Chains) -> dict[str, bool]:
+    """For each frame that both have, whether both are the same function: False if they are not, or if it cannot be decided."""
+    names = [name for name in a.paths if name in b.paths]
+    fields = {name: field_of((a.paths[name], b.paths[name])) for name in names}
+    decidable = {name: field for name, field in fields.items() if field is not None and field.bits <= MOST_BITS}
+    if not decidable:
+        return dict.fromkeys(names, False)
+    bits = max(field.bits for field in decidable.values())
+    with precision(bits + 4 * MARGIN):
+        both = [Chains(c.joints, {name: c.paths[name] for name in decidable}) for c in (a, b)]
+        pair = Pair.of(both[0], both[1], np.zeros((len(a.joints), 2)))
+        return {name: name in decidable and _equal(pair, both, name, decidable[name]) for name in names}
 
 
-def _equal(paths: tuple[Path, Path], scales: tuple[int, ...]) -> bool | None:
+def _equal(pair: Pair, both: list[Chains], name: str, field: Field) -> bool:
+    """Joint by joint, by constants, if both have the same joints; else both chains are multiplied out."""
+    separation = flint.arb(2) ** -field.bits
+    end = pair.deviation(name)
+    if end is not None:
+        E, joints = end.E, len(end.residuals)
+        left = [x for residual in end.residuals for x in residual.entries]
+        left += [E[i, j] - int(i == j) for i in range(3) for j in range(4)]
+        # All together they bound every coefficient, carried by the lengths of the chain at most.
+        return all(x.abs_upper() * (64 * (joints + 1) * math.ceil(field.size + 1)) < separation for x in left)
+    paths = [chains.paths[name] for chains in both]
     if any(sum(step.turns and step.moves for step in path) > MOST_JOINTS for path in paths):
-        return None
-    field = field_of(paths)
-    if field is None or field.bits > MOST_BITS:
-        return None
-    with precision(field.bits + 4 * MARGIN):
-        separation = flint.arb(2) ** -field.bits
-        one, other = (_terms(path, scales) for path in paths)
-        numbers = [x for terms in map(subtract, one, other) for values in terms.values() for x in values]
-        if all(x.abs_upper() < separation for x in numbers):
-            return True
-        return False if any(x.abs_lower() > 0 for x in numbers) else None
+        return False
+    one, other = (_terms(path, pair.scales) for path in paths)
+    numbers = [x for terms in map(subtract, one, other) for values in terms.values() for x in values]
+    return all(x.abs_upper() < separation for x in numbers)
 
 
 def _terms(path: Path, scales: tuple[int, ...]) -> tuple[Terms, Terms]:

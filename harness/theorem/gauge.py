@@ -21,10 +21,14 @@ from harness.theorem.normal import Line, Motion
 
 @dataclass(frozen=True)
 class Residual:
-    """What did not commute with one joint: position [m], and the rotation's Frobenius norm. Upper bounds."""
+    """What did not commute with one joint: position [m], and the rotation's Frobenius norm. Upper bounds.
+
+    entries: the twelve numbers behind them.
+    """
 
     position: float
     chord: float
+    entries: tuple[Ball, ...]
 
 
 @dataclass(frozen=True)
@@ -90,7 +94,7 @@ def passed(at: Deviation, a: Motion, b: Motion) -> Deviation | None:
     p = [flint.arb(0), flint.arb(0), E[2, 3]] if a.turns else [E[i, 3] for i in range(3)]
     turn = [E[i, j] - R[i][j] for i in range(3) for j in range(3)]
     shift = [E[i, 3] - p[i] for i in range(3)]
-    return Deviation((*at.residuals, Residual(norm(shift), norm(turn))), rigid(R, p))
+    return Deviation((*at.residuals, Residual(norm(shift), norm(turn), (*shift, *turn))), rigid(R, p))
 
 
 def norm(values: Sequence[Ball]) -> float:

@@ -24,7 +24,8 @@ class At:
     """Placements at one configuration q (n,) [rad or m], read as the exact numbers that its float64 are."""
 
     def __init__(self, q: Array) -> None:
-        self._q = [flint.arb(float(x)) for x in q]
+        self.q = q
+        self._exact = [flint.arb(float(x)) for x in q]
         self._known: dict[Motion, Matrix] = {}
 
     def placement(self, line: Line) -> Matrix:
@@ -37,7 +38,7 @@ class At:
         return T * line.tail
 
     def _motion(self, motion: Motion) -> Matrix:
-        terms = [flint.arb(flint.fmpq(x.numerator, x.denominator)) * q for x, q in zip(motion.row, self._q, strict=True) if x]
+        terms = [flint.arb(flint.fmpq(x.numerator, x.denominator)) * q for x, q in zip(motion.row, self._exact, strict=True) if x]
         amount = sum(terms, flint.arb(0))
         T = identity()
         if motion.turns:

@@ -14,7 +14,7 @@ from harness.theorem.balls import Matrix, identity, onto, rigid
 from harness.theorem.chain import Chains, Path, Row, Step
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Motion:
     """One moving step of a normal form.
 
@@ -75,4 +75,5 @@ def _motion(step: Step, parent: Motion | None, before: Matrix) -> tuple[Motion, 
         A = A * flint.arb_mat([[1, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1]])
         row = tuple(-x for x in row)
     depth = 0 if parent is None else parent.depth + 1
-    return Motion(parent, before * upright.constant * A, upright.turns, row, depth), A.transpose()
+    before = before * upright.constant * A
+    return Motion(parent=parent, before=before, turns=upright.turns, row=row, depth=depth), A.transpose()

@@ -13,11 +13,13 @@ from harness.theorem.balls import Matrix, identity
 from harness.theorem.chain import Chains, Path, Step
 from harness.theorem.coefficients import Coefficients, of_terms
 from harness.theorem.gauge import Deviation, Gauge, carried, reaches, size_of
+from harness.theorem.lower import At
 from harness.theorem.normal import Line, Motion, normal
 from harness.theorem.polynomial import Polynomial, Terms, subtract
 from harness.theorem.scales import scales_of
 
 MOST_TERMS = 10_000  # of one polynomial: nine joints that turn
+TRIED = 6  # configurations
 NEGLIGIBLE = 1e-3  # share of a bound that what is left behind may have
 
 
@@ -69,12 +71,16 @@ class Pair:
         both = [Chains(c.joints, {name: c.paths[name] for name in names}) for c in (a, b)]
         return cls(names=names, a=normal(both[0]), b=normal(both[1]), ranges=ranges, scales=scales_of(both))
 
+    def deviation(self, name: str) -> Deviation | None:
+        """What is left at a frame when all that commutes has moved to its end; None if the joints are not the same."""
+        return self._gauge.at_end(self.a[name], self.b[name])
+
     def by_joints(self, name: str) -> tuple[tuple[float, float], tuple[bool, bool]]:
         """Bounds by constants alone: position [m], chord; and for each whether the discrepancy is the same everywhere.
 
         Infinite if both chains do not have the same joints in the same order.
         """
-        end = self._gauge.at_end(self.a[name], self.b[name])
+        end = self.deviation(name)
         if end is None:
             return (math.inf, math.inf), (False, False)
         own, left = size_of(end.E), carried(end, reaches(self.a[name], self.ranges))
@@ -141,12 +147,16 @@ class Pair:
         end.then(Step(T=line.tail))
         return end.finished()
 
+    @cached_property
+    def tries(self) -> list[At]:
+        """Configurations at which every frame is looked at, always the same."""
+        return [At(q) for q in self._some(TRIED)]
+
     def middle(self) -> Array:
         """A configuration at which nothing in particular happens, (n,)."""
         return np.asarray(self.ranges.mean(axis=1))
 
-    def some(self, count: int) -> list[Array]:
-        """Configurations to try, (n,) each, always the same."""
+    def _some(self, count: int) -> list[Array]:
         rng = np.random.default_rng(0)
         turns = math.pi * np.array(self.scales)
         slides = np.array([self._slides(j) for j in range(len(turns))], dtype=bool)

@@ -33,7 +33,7 @@ for _row, _column, _value in (
     _STEP[_row, _column] = _value
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Polynomial:
     """A placement, as far as it has been multiplied out.
 
@@ -54,12 +54,14 @@ class Polynomial:
     @classmethod
     def one(cls, scales: tuple[int, ...]) -> Polynomial:
         """The identity."""
-        return cls(scales, [(0,) * len(scales)], flint.arb_mat(3, 6, [int(r == c) for r in range(3) for c in range(6)]))
+        R = flint.arb_mat(3, 6, [int(r == c) for r in range(3) for c in range(6)])
+        return cls(scales=scales, keys=[(0,) * len(scales)], R=R)
 
     def copy(self) -> Polynomial:
         """Another one, to go on with along another branch."""
         p = {key: list(values) for key, values in self.p.items()}
-        return Polynomial(self.scales, list(self.keys), self.R, p, flint.arb_mat(self.pending))
+        pending = flint.arb_mat(self.pending)
+        return Polynomial(scales=self.scales, keys=list(self.keys), R=self.R, p=p, pending=pending)
 
     def then(self, step: Step) -> None:
         """Multiply by one more step from the right."""

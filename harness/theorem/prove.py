@@ -7,7 +7,6 @@ docs/theory.md has the proofs.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
@@ -26,7 +25,6 @@ from harness.theorem.sharp import Top, highest, random_starts, sharpened
 Method: TypeAlias = Literal["constant", "joints", "coefficients", "grid"]
 
 RATIO = 1.1
-TRIED = 8  # configurations at which long chains are evaluated
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,48 +85,54 @@ class _Part:
     found: Top
     method: Method
 
+    @property
+    def is_sharp(self) -> bool:
+        """Whether the bound is no more than a tenth above what was found."""
+        return self.method == "constant" or self.upper <= RATIO * self.found.value
+
 
 def _frame(pair: Pair, name: str, effort: Effort) -> FrameBound:
     rough, constant = pair.by_joints(name)
-    functions = pair.multiplied_out(name)
+    seen = [(at.q, at.seen(pair.a[name], pair.b[name])) for at in pair.tries]
     parts = []
     for i in range(2):
-        start = _Part(rough[i], Top(0.0, pair.middle()), "constant" if constant[i] else "joints")
-        part = start if constant[i] or functions is None else _better(start, functions[i])
-        if not constant[i] and functions is not None and effort.nodes:
-            part = _sharp(pair, name, part, functions[i] if i == 0 else None, effort)
-        parts.append(part)
-    tries = [part.found.q for part in parts] + (pair.some(TRIED) if functions is None else [])
-    seen = [At(q).seen(pair.a[name], pair.b[name]) for q in tries]
-    best = [max(range(len(seen)), key=lambda k, i=i: seen[k][i]) for i in range(2)]  # type: ignore[misc]
+        q, largest = max(seen, key=lambda entry, i=i: entry[1][i])  # type: ignore[misc]
+        parts.append(_Part(rough[i], Top(largest[i], q), "constant" if constant[i] else "joints"))
+    functions = None if all(part.is_sharp for part in parts) else pair.multiplied_out(name)
+    if functions is not None:
+        parts = [part if part.is_sharp else _better(part, f) for part, f in zip(parts, functions, strict=True)]
+        if effort.nodes:
+            parts = [_sharp(pair, name, part, f, effort) for part, f in zip(parts, (functions[0], None), strict=True)]
+    seen += [(q, At(q).seen(pair.a[name], pair.b[name])) for q in (part.found.q for part in parts)]
+    best = [max(seen, key=lambda entry, i=i: entry[1][i]) for i in range(2)]  # type: ignore[misc]
     return FrameBound(
         position=parts[0].upper,
         rotation=float(chord_angle(np.array(parts[1].upper))),
-        position_found=seen[best[0]].position,
-        rotation_found=float(chord_angle(np.array(seen[best[1]].chord))),
+        position_found=best[0][1].position,
+        rotation_found=float(chord_angle(np.array(best[1][1].chord))),
         slope=0.0 if constant[0] else functions and functions[0].slope(),
         method=parts[0].method,
-        worst=np.stack([tries[k] for k in best]),
+        worst=np.stack([q for q, _ in best]),
     )
 
 
 def _better(part: _Part, function: Coefficients) -> _Part:
     """With the bound that the coefficients give, and the largest value that climbing finds."""
-    top = highest(function, random_starts(function), math.pi / 4)
+    top = max(part.found, highest(function, random_starts(function)), key=lambda t: t.value)
     bound = function.bound()
     return _Part(bound, top, "coefficients") if bound < part.upper else replace(part, found=top)
 
 
 def _sharp(pair: Pair, name: str, part: _Part, function: Coefficients | None, effort: Effort) -> _Part:
     """With the bound of the grid, if the one so far is large and loose. `function`: None for the rotation."""
-    if part.upper <= effort.above or part.upper <= RATIO * part.found.value:
+    if part.upper <= effort.above or part.is_sharp:
         return part
     if function is None:
         function = rotation_difference(pair, name)
         if function is None:
             return part
         part = _better(part, function)
-        if part.upper <= RATIO * part.found.value:
+        if part.is_sharp:
             return part
     bound, top = sharpened(function, part.found, effort.nodes)
     return _Part(bound, top, "grid") if bound < part.upper else replace(part, found=top)

@@ -22,9 +22,9 @@ from harness.theorem.coefficients import ROUNDING, Coefficients
 NEGLIGIBLE = 0.005  # share of the largest value found that joints may have which are left out of the grid
 TARGET = 1.085  # growth between the nodes that is aimed at
 FINEST = 64  # nodes a degree
-STARTS = 48
-SWEEPS = 5
-STEPS = 16
+STARTS = 32
+POINTS = 129
+WIDTHS = (1.0, 0.5, 0.02, 0.02, 0.002, 0.0005)  # of a period, each way
 
 Complex: TypeAlias = NDArray[np.complex128]
 
@@ -37,30 +37,34 @@ class Top:
     q: Array
 
 
-def highest(function: Coefficients, starts: Array, width: float) -> Top:
-    """Climb from the best of some configurations to a local maximum, joint by joint, in ever smaller steps.
+def highest(function: Coefficients, starts: Array) -> Top:
+    """Climb from the best of some configurations to a local maximum, joint by joint.
+
+    Along one joint the function is known from a few vectors, so each step looks at the whole circle, the last ones closely.
 
     Args:
         function: the function.
         starts: configurations (S, n) [rad or m].
-        width: how far the first steps go [rad, or the share of a slide's range].
     """
     norms = np.linalg.norm(function.values(starts), axis=1)
     q, best = starts[norms.argmax()].copy(), float(norms.max())
     moving = [j for j in range(starts.shape[1]) if function.frequencies[:, j].any() or (function.linear == j).any()]
-    for _ in range(SWEEPS):
+    for width in WIDTHS:
         for j in moving:
-            tries = np.repeat(q[None], 2 * STEPS + 1, axis=0)
-            slides = not function.frequencies[:, j].any()
-            low, high = function.ranges[j]
-            tries[:, j] += np.linspace(-width, width, 2 * STEPS + 1) * ((high - low) if slides else function.scales[j])
-            if (function.linear == j).any():
-                tries[:, j] = np.clip(tries[:, j], low, high)
-            norms = np.linalg.norm(function.values(tries), axis=1)
+            tries = _tries(function, q, j, width)
+            norms = np.linalg.norm(function.along(q, j, tries), axis=1)
             if norms.max() > best:
-                q, best = tries[norms.argmax()], float(norms.max())
-        width /= 4.0
+                q[j], best = tries[norms.argmax()], float(norms.max())
     return Top(best, q)
+
+
+def _tries(function: Coefficients, q: Array, joint: int, width: float) -> Array:
+    """Values of one joint to look at: around the one it has, by up to so much of a period or of its range."""
+    low, high = function.ranges[joint]
+    if (function.linear == joint).any():
+        return np.clip(np.linspace(q[joint] - width * (high - low), q[joint] + width * (high - low), POINTS), low, high)
+    turn = 2.0 * math.pi * function.scales[joint]
+    return np.asarray(q[joint] + np.linspace(-width * turn, width * turn, POINTS))
 
 
 def random_starts(function: Coefficients) -> Array:
@@ -93,7 +97,7 @@ def sharpened(function: Coefficients, top: Top, most: int) -> tuple[float, Top]:
     starts = function.ranges.mean(axis=1)[None].copy()
     for axis, index in zip(axes, nodes, strict=True):
         starts[0, axis.joint] = axis.nodes[index]
-    climbed = highest(function, starts, math.pi / 16.0)
+    climbed = highest(function, starts)
     bound = (size * growth + ROUNDING * plain) * (1.0 + ROUNDING) + reduced.error
     return min(plain, bound), max(top, climbed, key=lambda t: t.value)
 

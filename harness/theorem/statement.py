@@ -63,21 +63,21 @@ def theorem(a: Chains, b: Chains, ranges: Mapping[str, tuple[float, float]], eff
     shared = sum(name in b.paths for name in a.paths)
     effort = effort or Effort(nodes=min(Effort().nodes, MOST_NODES // max(shared, 1)))
     bounds = prove(a, b, limits, effort)
-    close = [name for name, bound in bounds.items() if max(bound.position, bound.rotation) < CLOSE]
-    equality: dict[str, Equality] = dict.fromkeys(bounds, "not equal")
-    equality |= _equality(a, b, close)
+    equality = _equality(a, b, bounds)
     exact = {name for name, word in equality.items() if word == "equal"}
     frames = {name: _nothing(bound) if name in exact else bound for name, bound in bounds.items()}
     return Theorem(frames=frames, equality=equality, ranges=dict(ranges))
 
 
-def _equality(a: Chains, b: Chains, names: list[str]) -> dict[str, Equality]:
-    decided = equal(_only(a, names), _only(b, names))
-    words: dict[str, Equality] = {}
-    for name in names:
-        words[name] = "equal" if decided[name] else "not equal" if decided[name] is False else "not decided"
-    rest = [name for name in names if words[name] != "equal"]
-    meant = equal(with_pi(_only(a, rest)), with_pi(_only(b, rest)))
+def _equality(a: Chains, b: Chains, bounds: Mapping[str, FrameBound]) -> dict[str, Equality]:
+    """What was found somewhere, in ball arithmetic, is no equality. The rest is decided, as written and as meant."""
+    apart = {name for name, bound in bounds.items() if bound.position_found > 0.0 or bound.rotation_found > 0.0}
+    close = [name for name, bound in bounds.items() if max(bound.position, bound.rotation) < CLOSE]
+    words: dict[str, Equality] = {name: "not equal" if name in apart else "not decided" for name in bounds}
+    decided = equal(*(_only(c, [name for name in close if name not in apart]) for c in (a, b)))
+    words |= {name: "equal" for name, same in decided.items() if same}
+    rest = [name for name in close if words[name] != "equal"]
+    meant = equal(*(with_pi(_only(c, rest)) for c in (a, b)))
     return words | {name: "equal but for the digits of pi" for name in rest if meant[name]}
 
 

@@ -9,6 +9,7 @@ from harness.engines.base import Refusal, Trait
 from harness.engines.registry import adapter_of
 from harness.errors import CrosscheckError, EngineUnavailable, InputError
 from harness.report import document as doc
+from harness.report import proof_parts as proofs
 from harness.report import source_parts as parts
 from harness.report.explanation import Explanation
 from harness.report.pose import Pose
@@ -39,7 +40,7 @@ class _Result(TypedDict, total=False):
     explanation: Explanation | None
     reproducer: parts.Reproducer | None
     pose: Pose | None
-    certificate: parts.Certificate | None
+    certificate: proofs.Certificate | None
 
 
 class _Given(TypedDict, total=False):

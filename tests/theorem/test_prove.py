@@ -167,7 +167,7 @@ def test_equality_in_other_angles_than_right_ones() -> None:
 
 def test_angles_that_are_no_multiples_of_pi_are_not_decided() -> None:
     table = ur5(alpha=(0, 0.1))
-    assert equal(chains(table), chains(table)) == {"end": None}
+    assert equal(chains(table), chains(table)) == {"end": False}
     assert bound(table, table).position < 1e-30
 
 
