@@ -328,11 +328,11 @@ def test_an_engine_that_clamps_agrees_within_limits_but_not_at_the_gate(
     monkeypatch.setattr(registry, "registered", lambda: known)
     folder = copy_model("sixr", ("model.toml", 'name = "dh:pinocchio"', 'name = "dh:fake"'))
     (folder / "configurations.toml").write_text("")
-    sampled = crosscheck(load_model(folder), Options(samples=200, seed=0, sources=("dh:fake",), explain=False))
+    sampled = crosscheck(load_model(folder), Options(samples=200, seed=0, sources=("dh:fake",), explain=False, probe=False))
     assert sampled.verdict.exit_code == 0
     text = (folder / "model.toml").read_text().replace('convention = "modified"', 'convention = "modified"\ngate = "certified"')
     (folder / "model.toml").write_text(text)
-    report = crosscheck(load_model(folder), Options(samples=200, seed=0, sources=("dh:fake",), explain=False))
+    report = crosscheck(load_model(folder), Options(samples=200, seed=0, sources=("dh:fake",), explain=False, probe=False))
     assert report.verdict.exit_code == 1
     assert "is within tolerance where it was sampled, but dh:fake is not the polynomial" in report.verdict.sentence
 
