@@ -21,6 +21,7 @@ from harness.report.model_parts import Link, ParameterPair
 from harness.report.proven import for_all, proven_text
 from harness.report.sentences import change_of, changed_text, difference, moved_text
 from harness.report.source_parts import FrameResult
+from harness.report.tested import further_out, own_description
 from harness.report.text import degrees, metres, numbers, pasteable, plain, point, quantity, radians
 from harness.report.verdicts import Verdict
 
@@ -49,7 +50,7 @@ def _environment() -> Environment:
     env.filters.update(
         metres=metres, radians=radians, numbers=numbers, colour=colour, for_all=for_all, quantity=quantity, difference=difference,
         change_of=change_of, moved=moved_text, changed=changed_text, apart=apart, point=point,
-        degrees=degrees, pasteable=pasteable,
+        degrees=degrees, pasteable=pasteable, own_description=own_description, further_out=further_out,
     )  # fmt: skip
     return env
 
@@ -75,6 +76,7 @@ def render_html(report: Report) -> str:
         blind={frame.name for frame in report.frames if frame.relation == "rigid"},
         side_by_side=_side_by_side(report),
         certified=[s for s in report.sources if s.certificate],
+        tested=[s for s in report.sources if s.tested],
         explained=[s for s in report.sources if s.explanation],
         absent=[s for s in report.sources if s.status != "ran"],
         posed=posed(report),

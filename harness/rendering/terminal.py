@@ -9,6 +9,7 @@ from harness.rendering.tables import bare_table
 from harness.report.document import Report, Source
 from harness.report.proven import for_all
 from harness.report.sentences import changed_text, moved_text, why
+from harness.report.tested import all_tested, further_out
 from harness.report.text import metres, numbers, plain, radians
 from harness.report.verdicts import Verdict
 
@@ -31,6 +32,7 @@ def show(report: Report, console: Console) -> None:
     _causes(report, console)
     for source in report.sources:
         _located(source, report.settings.reference, console)
+    _tested(report, console)
     for reason in report.verdict.reasons[1:MAX_REASONS]:
         console.print(Text(f"  also: {plain(reason)}"), soft_wrap=True)
     if (more := len(report.verdict.reasons) - MAX_REASONS) > 0:
@@ -69,6 +71,15 @@ def _since(report: Report, console: Console) -> None:
         console.print(Text(text, style="red" if change.worse else ""), soft_wrap=True)
     if (more := max(0, len(g.moved) - MAX_MOVED) + max(0, len(g.changed) - MAX_MOVED)) > 0:
         console.print(Text(f"  and {more} more changes in the report"))
+
+
+def _tested(report: Report, console: Console) -> None:
+    """Each engine against its own description: one line for all that compute what it says, and one a source for what else is."""
+    if text := all_tested(report.sources):
+        console.print(Text(plain(f"  {text}")))
+    for source in report.sources:
+        for text in further_out(source):
+            console.print(Text(plain(f"  {source.name}: {text}")), soft_wrap=True)
 
 
 def _row(source: Source) -> tuple[Text, ...]:

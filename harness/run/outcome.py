@@ -14,6 +14,7 @@ from harness.run.binding import Bound
 from harness.run.options import Options
 from harness.run.plan import Planned, pair_tolerance
 from harness.run.rigid import Offset, transforms
+from harness.run.tested import Tested
 from harness.se3 import Array
 from harness.theorem.prove import FrameBound
 from harness.theorem.statement import Theorem
@@ -82,7 +83,7 @@ class Outcome:
     status: `ran` until it fails.
     reason, install: why it does not run, and the line that installs it.
     bound: its engine; None once it does not run.
-    reproduced, worst, certified, explained: what the phases of the run gave; None where they had nothing to say.
+    reproduced, worst, certified, explained, tested: what the phases of the run gave; None where they had nothing to say.
     """
 
     planned: Planned
@@ -94,6 +95,7 @@ class Outcome:
     worst: Worst | None = None
     certified: Certified | None = None
     explained: Explained | None = None
+    tested: Tested | None = None
 
     @property
     def name(self) -> str:
@@ -111,7 +113,7 @@ class Outcome:
 
         What the source gave before goes with it: a partial result is no result.
         """
-        self.bound = self.reproduced = self.worst = self.certified = self.explained = None
+        self.bound = self.reproduced = self.worst = self.certified = self.explained = self.tested = None
         self.status = "not run" if isinstance(error, EngineUnavailable) else "failed"
         self.reason = error.reason if isinstance(error, EngineUnavailable | EngineFailed) else f"{type(error).__name__}: {error}"
         self.install = (error.install or "") if isinstance(error, EngineUnavailable) else ""
@@ -163,6 +165,19 @@ class Run:
     def tolerance(self, outcome: Outcome) -> tuple[float, float]:
         """Tolerance [m], [rad] of a source against the reference."""
         return pair_tolerance(outcome.planned, self.reference.planned)
+
+    def take_out(self, outcome: Outcome, error: Exception, where: str = "") -> None:
+        """Take out a source that failed after it was compared.
+
+        error: what it raised.
+        where: when it did, for the reason.
+        """
+        outcome.fail(error)
+        outcome.reason = f"{outcome.reason} {where}".rstrip()
+        if outcome is self.reference:
+            self.comparison = None
+        elif self.comparison is not None:
+            self.comparison.drop(outcome.name)
 
     def discrepancies(self) -> Comparison:
         """The comparison. Raises RuntimeError if the reference does not run."""

@@ -98,6 +98,7 @@ def _settings(run: Run) -> doc.Settings:
         fixed=fixed,
         samples=options.samples,
         seed=options.seed,
+        probe_seed=options.probe_seed,
         subset=run.comparison.subset if run.comparison else 0,
         command=options.command,
     )

@@ -12,6 +12,7 @@ from harness.report.regression import Regression
 from harness.report.sentences import worsened
 from harness.report.text import metres, radians
 from harness.report.verdicts import Verdict
+from harness.se3 import REPEATED
 
 # What hides what, if several apply. A disagreement found stays found. After a fault of the harness nothing else is sure.
 _ORDER = (ExitCode.DISAGREES, ExitCode.INTERNAL, ExitCode.WRONG_INPUT, ExitCode.NOT_VERIFIED)
@@ -102,8 +103,19 @@ def _misfiled(claims: list[doc.PublishedResult]) -> str:
     )
 
 
+def _by_test(source: doc.Source) -> str:
+    """What was seen only where the source was tested against its own description; empty if the comparison shows it too."""
+    compared = {
+        Verdict.INVALID_PLACEMENTS: source.validity is not None and source.validity.first is not None,
+        Verdict.KEEPS_STATE: source.validity is not None and source.validity.again > REPEATED,
+    }.get(source.verdict, any(not f.passes for f in source.frames))
+    return "" if source.tested is None or compared else source.tested.problem
+
+
 def describe(source: doc.Source) -> str:
     """Where and by how much a source is off, in one clause."""
+    if by_test := _by_test(source):
+        return by_test
     if source.verdict is Verdict.INVALID_PLACEMENTS and source.validity is not None and source.validity.first is not None:
         v = source.validity
         return (
