@@ -20,6 +20,7 @@ from tests.helpers import compared, copied, crosscheck
 # The browser's path, said aloud by whoever runs these tests (nox -s browser).
 BROWSER = os.environ.get("CROSSCHECK_TESTS_BROWSER", "")
 FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--enable-unsafe-swiftshader"]
+FLAGS += ["--host-resolver-rules=MAP rebound.test 127.0.0.1"]  # a name of somebody's that leads to this machine
 SOURCES = ("dh:pinocchio", "urdf:pinocchio", "urdf:yourdfpy")
 
 Open = Callable[..., Any]
