@@ -53,7 +53,7 @@ def start_server(viser: Any, guard: Guard, port: int, label: str) -> tuple[Any, 
     version = str(getattr(viser, "__version__", "of an unknown version"))
     if not _is_known(version):
         raise unknown_viser(f"it is {version}")
-    logging.getLogger("websockets").setLevel(logging.CRITICAL)  # what a browser sends, or leaves out, is no error of ours
+    logging.getLogger("websockets").setLevel(logging.ERROR)  # a browser that goes away is no error of ours
     with contextlib.ExitStack() as undo:
         door = undo.enter_context(contextlib.closing(_listening(port)))
         port = door.getsockname()[1]
@@ -160,8 +160,6 @@ def _request_check(guard: Guard, visitors: Visitors, inner: Callable[..., Any] |
         if response is not None:
             response.headers.update(page_headers(port))
             return response
-        if not is_socket:  # it would go on as a WebSocket
-            return connection.respond(http.HTTPStatus.FORBIDDEN, REFUSED)
         return None if visitors.opens_page(connection) else connection.respond(http.HTTPStatus.SERVICE_UNAVAILABLE, FULL)
 
     return process
@@ -185,9 +183,8 @@ def _cleaning(base: Any, guard: Guard, visitors: Visitors) -> Any:
                 raw = await super().recv()
                 await asyncio.sleep(PAUSE)
                 message = None
-                if isinstance(raw, bytes):
-                    with contextlib.suppress(Exception):  # no msgpack, or nested too deeply
-                        message = cleaned(msgpack.decode(raw), guard.controls)
+                with contextlib.suppress(Exception):  # a text, no msgpack, or nested too deeply
+                    message = cleaned(msgpack.decode(raw), guard.controls)
                 if message is not None:
                     return bytes(msgpack.encode(message))
 

@@ -273,6 +273,16 @@ def test_what_is_no_message_is_ignored(view: View, payload: bytes, capfd: pytest
     assert capfd.readouterr() == ("", "")
 
 
+def test_what_is_no_request_is_not_told_in_the_terminal(view: View, caplog: pytest.LogCaptureFixture) -> None:
+    for sent in (b"\x16\x03\x01\r\n\r\n", b"GET\r\n\r\n", b"GET / HTTP/1.1\r\nno header\r\n\r\n", b"GET / HTTP/9\r\n\r\n"):
+        assert answer(view.port, sent)[0] in (0, 400)
+    with view.open() as page:
+        page.go_on(b"\xff" * 100)
+        assert page.close_code() == 1002
+    assert view.serves()
+    assert [record.getMessage() for record in caplog.records] == []
+
+
 # Too much
 
 
