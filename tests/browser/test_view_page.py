@@ -74,7 +74,7 @@ def test_a_slider_moves_the_arm_and_the_discrepancy(
     open_page: Open, served: tuple[str, int], broken: Path, models: dict[str, RobotModel]
 ) -> None:
     page = open_page(served[0] + "/", offline=False, drawn=False)
-    page.wait_for_selector("#discrepancies table", timeout=60_000)
+    page.wait_for_selector("#discrepancies table")
     tables = [DHNumpy(model.table) for model in (load_model(broken), models["ur5"])]
 
     def shown() -> tuple[list[float], str]:
@@ -118,7 +118,7 @@ def test_a_slider_moves_the_arm_and_the_discrepancy(
 
 def test_buttons_go_to_the_worst_the_published_and_the_singular(open_page: Open, served: tuple[str, int]) -> None:
     page = open_page(served[0] + "/", offline=False, drawn=False)
-    page.wait_for_selector("#discrepancies table", timeout=60_000)
+    page.wait_for_selector("#discrepancies table")
     for name in (r"urdf:pinocchio at ", "article", r"1: smallest singular value"):
         before = page.locator("#discrepancies p").first.inner_text()
         page.get_by_role("button", name=re.compile(name)).first.click()
