@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.certificate.interpolation import Axis, coefficient_sum, grid, weights
+from harness.digits import steps
 from harness.se3 import Array, chord_angle
 
 # q (N, n) to placements (N, F, 4, 3): columns x, y, z axis and origin [m] of each frame.
@@ -186,7 +187,7 @@ def ascend(difference: Evaluate, axes: list[Axis], starts: Array, frames: Indice
             candidates = np.linspace(axis.lower, axis.upper, SCAN + 1)
             along = np.einsum("ck,skd->scd", axis.weights(candidates), values)
             size = np.where((parts == 0)[:, None], _norm(along[..., 9:]), _norm(along[..., :9]))
-            q[:, j] = candidates[size.argmax(axis=1)]
+            q[:, j] = candidates[steps(size).argmax(axis=1)]  # of equal ones the first, not what rounding chooses
     return q
 
 
@@ -206,7 +207,7 @@ def found_from(difference: Evaluate, interpolant: Evaluate, axes: list[Axis], st
     D = difference(starts)
     F = D.shape[1]
     sizes = np.stack([_norm(D[:, :, 3]), _norm(D[:, :, :3].reshape(len(D), F, 9))])
-    best, index = sizes.max(axis=1), sizes.argmax(axis=1)
+    best, index = sizes.max(axis=1), steps(sizes).argmax(axis=1)
     parts, frames = np.nonzero(best > floor)
     q = ascend(interpolant, axes, starts[index[parts, frames]], frames, parts)
     if len(q):

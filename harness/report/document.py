@@ -1,19 +1,34 @@
 """The report document: typed once; JSON Schema is generated from these types and every format is rendered from them.
 
 Units are metres and radians. Everything that varies between two equal runs (times, versions, host) is in `environment`.
+Computed numbers are written to the digits that mean something, so that the rest does not depend on the processor: their types
+do that, see `harness.digits`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
+from harness.digits import coordinate
 from harness.report.explanation import Explanation
 from harness.report.model_parts import SideBySide, Trees
 from harness.report.notebook import html_lines, html_table, text_table
-from harness.report.parts import Configuration, Count, Finite, Matrix, NonNegative, Part, RobotName, Rotation, Vector
+from harness.report.parts import (
+    Configuration,
+    Coordinate,
+    Count,
+    Discrepancy,
+    Finite,
+    Matrix,
+    NonNegative,
+    Part,
+    RobotName,
+    Rotation,
+    Vector,
+)
 from harness.report.pose import Pose
 from harness.report.regression import Regression
 from harness.report.source_parts import Certificate, FrameResult, Reproducer, Tolerance, TraitNote, Validity
@@ -118,9 +133,9 @@ class PairResult(Part):
 
     a: str
     b: str
-    position: NonNegative
+    position: Discrepancy
     position_frame: str
-    rotation: NonNegative
+    rotation: Discrepancy
     rotation_frame: str
 
 
@@ -137,11 +152,11 @@ class PublishedResult(Part):
     claimed_position: Vector
     claimed_rotation: Rotation | None
     computed: Matrix
-    computed_rpy: Vector
+    computed_rpy: Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
     tolerance: NonNegative
     rotation_tolerance: NonNegative
-    position_error: NonNegative
-    rotation_error: NonNegative | None
+    position_error: Discrepancy
+    rotation_error: Discrepancy | None
 
 
 class Lint(Part):
@@ -164,7 +179,7 @@ class Robot(Part):
     joints: list[str]
     lower: list[Finite]
     upper: list[Finite]
-    reach: NonNegative
+    reach: Annotated[NonNegative, AfterValidator(coordinate)]
     hashes: dict[str, str]
 
     @model_validator(mode="after")
