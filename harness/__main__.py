@@ -7,6 +7,8 @@ import signal
 import sys
 from types import FrameType
 
+from harness.kernels import fix_kernels
+
 INTERRUPTED = 130
 
 
@@ -14,6 +16,7 @@ def main() -> None:
     """Entry point."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else the caller wants it ignored
         signal.signal(signal.SIGINT, _interrupt)
+    fix_kernels(os.environ)  # before NumPy is imported
     try:
         from harness.cli.main import main as command  # noqa: PLC0415
 

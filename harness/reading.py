@@ -8,12 +8,14 @@ level of nesting, and some take quadratic time for long keys.
 from __future__ import annotations
 
 import codecs
+import hashlib
 import itertools
 import json
 import os
 import re
 import stat
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +65,20 @@ def read_bytes(path: Path, limit: int, error: type[InputError] = InputError) -> 
 
     Raises `error` if it is absent, no regular file, unreadable or too large.
     """
+    return b"".join(_pieces(path, limit, error))
+
+
+def digest(path: Path, limit: int) -> tuple[int, str]:
+    """Size and SHA-256 of a regular file, of which no more than a piece is kept. Raises InputError as `read_bytes` does."""
+    sha, size = hashlib.sha256(), 0
+    for piece in _pieces(path, limit, InputError):
+        sha.update(piece)
+        size += len(piece)
+    return size, sha.hexdigest()
+
+
+def _pieces(path: Path, limit: int, error: type[InputError]) -> Iterator[bytes]:
+    """What `read_bytes` reads, piece by piece."""
     if "\0" in str(path):
         raise error(f"no file has such a name: {str(path)!r}")
     try:
@@ -70,18 +86,16 @@ def read_bytes(path: Path, limit: int, error: type[InputError] = InputError) -> 
         # A pipe put in its place meanwhile does not make this wait.
         with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)), "rb") as file:
             _require_file(os.fstat(file.fileno()), path, limit, error)
-            pieces: list[bytes] = []
-            left = limit + 1
-            while left > 0 and (piece := file.read(min(left, _PIECE))):
-                pieces.append(piece)
-                left -= len(piece)
+            rest = limit + 1
+            while rest > 0 and (piece := file.read(min(rest, _PIECE))):
+                yield piece
+                rest -= len(piece)
     except FileNotFoundError:
         raise _absent(path, error) from None
     except OSError as failure:
         raise error(f"cannot be read: {failure.strerror}", where=path) from None
-    if left == 0:
+    if rest == 0:
         raise error(f"expected at most {limit} bytes, got more", where=path)
-    return b"".join(pieces)
 
 
 def read_text(path: Path, limit: int, error: type[InputError] = InputError) -> str:

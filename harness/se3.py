@@ -18,6 +18,7 @@ Array: TypeAlias = NDArray[np.float64]
 RIGID = 1e-6  # the largest entry of R'R - I, or error of the last row 0 0 0 1, of a rigid transform
 REPEATED = 1e-9  # the largest change of an entry when it is asked for again: batches round differently from single rows
 
+CANCELLED = 1e-3  # the sum of the two smaller singular values of a mean rotation, of which the larger are at most 1
 QUARTER_TURN = math.pi / 2
 _CHORD = 2.0 * math.sqrt(2.0)  # of half a turn
 
@@ -101,8 +102,15 @@ def chord_angle(chord: Array) -> Array:
 
 
 def mean_transform(T: Array) -> Array:
-    """Mean of transforms (..., 4, 4), the rotation in the chordal sense (Moakher 2002, doi:10.1137/S0895479801383877)."""
+    """Mean of transforms (..., 4, 4), the rotation in the chordal sense (Moakher 2002, doi:10.1137/S0895479801383877).
+
+    Rotations that cancel out have no mean: all are as far from it. The first of them is taken then, not what rounding leaves.
+    """
     mean = T.reshape(-1, 4, 4).mean(axis=0)
-    U, _, Vt = np.linalg.svd(mean[:3, :3])
-    mean[:3, :3] = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+    U, sizes, Vt = np.linalg.svd(mean[:3, :3])
+    turn = np.sign(np.linalg.det(U @ Vt))
+    if sizes[1] + turn * sizes[2] < CANCELLED:
+        mean[:3, :3] = T.reshape(-1, 4, 4)[0, :3, :3]
+    else:
+        mean[:3, :3] = U @ np.diag([1.0, 1.0, turn]) @ Vt
     return np.asarray(mean)

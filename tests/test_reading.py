@@ -257,10 +257,7 @@ def test_a_long_value_is_cut_in_the_message(tmp_path: Path) -> None:
 
 # Modules that read a file by themselves, and why.
 ALONE = {
-    "run/trust.py": "what the user has allowed, and digests of the files that a command names",
-    "run/inputs.py": "the digest of a program's file, up to a limit",
     "run/checkpoint.py": "a checkpoint that the harness wrote itself, and trusts no more than a stranger's",
-    "rendering/index.py": "the first characters of a report, to tell it from other JSON",
     "writing.py": "opens to write",
     "cli/fault_file.py": "writes the file of a fault, which nobody reads",
     "cli/output.py": "/dev/null in the place of an output that is closed",

@@ -8,6 +8,7 @@ import click
 
 from harness import api
 from harness.cli.console import console
+from harness.cli.output import Kept
 from harness.cli.shared import accepted_option, complete_robots, folders_of, models_option, robot_words
 from harness.description.locate import default_models_dir
 from harness.errors import InputError, command_line
@@ -35,7 +36,7 @@ def accept(robots: tuple[str, ...], models: Path | None, out: Path, accepted: Pa
         path = write(accepted / f"{report.robot.name}.json", accepted_text(accepted_from(report)))
         note = "" if report.passes else "; it does not pass: --strict will fail only for what grows from here"
         console().print(plain(f"{path}{note}"), markup=False, soft_wrap=True)
-    return 0
+    return Kept(0)
 
 
 def _current(folder: Path, models: Path | None, out: Path) -> Report:

@@ -12,6 +12,7 @@ from rich.text import Text
 
 from harness import api
 from harness.cli.console import console
+from harness.cli.output import Kept
 from harness.cli.shared import gathered
 from harness.convert.result import HEADER, Derived
 from harness.convert.verify import verify
@@ -54,6 +55,7 @@ def derive_dh(urdf_path: Path, settings: DeriveSettings) -> int:
     console().print(Text(plain(report.verdict.sentence), style="green" if report.passes else "red"), soft_wrap=True)
     if settings.out is not None:
         console().print(Text(f"written to {plain(str(settings.out / robot))}"), soft_wrap=True)
+        return Kept(report.verdict.exit_code)
     return report.verdict.exit_code
 
 

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.text import Text
 
 from harness.cli.console import console
+from harness.cli.output import Kept
 from harness.cli.shared import complete_sources
 from harness.engines.base import Engine
 from harness.engines.registry import adapter_of, registered
@@ -47,7 +48,7 @@ def install_command(names: tuple[str, ...], everything: bool, constraint: Path |
     missing += sum(bool(entry.problem) for entry in done.values())
     asked = len(registered() if everything else names)
     _say(f"{asked - missing} of {asked} engines installed; environments in {cache_folder()}")
-    return 3 if missing else 0
+    return Kept(3 if missing else 0)
 
 
 def _say(text: str) -> None:

@@ -22,7 +22,10 @@ if TYPE_CHECKING:
 
 
 class Kept(int):
-    """An exit code that stands although its text may not have been read: the result is in files, or is the code itself."""
+    """An exit code that stands although its text may not have been read: the result is in files, or is the code itself.
+
+    Every command returns one whose work is done when the text is printed. The text then only says so, and nobody need read it.
+    """
 
 
 class Outlet(io.RawIOBase):

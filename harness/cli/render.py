@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from harness.cli.console import console
+from harness.cli.output import Kept
 from harness.rendering.files import prepare, write_rendered
 from harness.report.json_file import read_report
 from harness.report.text import plain
@@ -22,4 +23,4 @@ def render(report: Path, out: Path | None) -> int:
     prepare(folder)
     for path in write_rendered(document, folder):
         console().print(plain(str(path)), markup=False)
-    return 0
+    return Kept(0)

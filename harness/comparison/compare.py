@@ -18,6 +18,7 @@ from harness.comparison.components import (
     rotation_residual,
 )
 from harness.comparison.statistics import Stream
+from harness.digits import discrepancy, steps
 from harness.se3 import REPEATED, RIGID, Array
 
 Mask: TypeAlias = NDArray[np.bool_]
@@ -199,10 +200,11 @@ class Comparison:
                 pair = self.pairs.setdefault((a, b), Pair())
                 for name, values in (("position", position), ("rotation", rotation)):
                     seen = (values if mask is None else np.where(mask, values, 0.0))[:, :stop]
-                    worst = int(seen.max(axis=1).argmax())
-                    if seen[worst].max() >= getattr(pair, name):
-                        setattr(pair, name, float(seen[worst].max()))
-                        setattr(pair, f"{name}_frame", frames[worst])
+                    peaks, largest = seen.max(axis=1), getattr(pair, name)
+                    written = steps(peaks)
+                    if getattr(pair, f"{name}_frame") < 0 or written.max() > steps(largest):
+                        setattr(pair, f"{name}_frame", frames[int(written.argmax())])
+                    setattr(pair, name, max(largest, float(peaks.max())))
 
     def worst(self, source: str, tolerance: tuple[float, float], frames: Sequence[int]) -> tuple[int, int] | None:
         """Where a source is furthest outside its tolerance.
@@ -234,6 +236,6 @@ class Comparison:
         best, where = above, None
         for stream, limit in ((self.position[source], tolerance[0]), (self.rotation[source], tolerance[1])):
             for frame in frames:
-                if (ratio := float(stream.max[frame]) / limit) > best:
+                if (ratio := discrepancy(float(stream.max[frame])) / limit) > best:
                     best, where = ratio, (frame, int(stream.argmax[frame]))
         return where

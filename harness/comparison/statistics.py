@@ -5,17 +5,20 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from harness.digits import decimal_scale, steps
 from harness.se3 import Array
 
-LOWEST, HIGHEST, PER_DECADE = -18, 4, 16
+LOWEST, HIGHEST, PER_DECADE = -15, 4, 16
 BINS = (HIGHEST - LOWEST) * PER_DECADE
+EDGE = 1e-8  # bins: what is at an edge but for rounding, as 0.1 mm often is, has reached it
 
 
 class Stream:
     """Statistics of one quantity at `frames` frames, fed block by block with (frames, N) values.
 
-    The histogram has 16 bins a decade from 1e-18 to 1e4; what lies below is counted in the first bin. Values that are
-    not finite are left out and counted by the caller.
+    The histogram has 16 bins a decade from 1e-15 to 1e4; what lies below is counted in the first bin. Values that are
+    not finite are left out and counted by the caller. `argmax` is the first configuration whose value is written like `max`:
+    which one of them is larger by less is a matter of rounding.
     """
 
     def __init__(self, frames: int) -> None:
@@ -31,16 +34,16 @@ class Stream:
         if values.shape[1] == 0:
             return
         ranked = values if valid is None else np.where(valid, values, -1.0)
-        best = ranked.argmax(axis=1)
-        peak = np.take_along_axis(ranked, best[:, None], axis=1)[:, 0]
-        better = peak > self.max
-        self.max[better] = peak[better]
-        self.argmax[better] = best[better] + start
+        peak = ranked.max(axis=1)
+        better = steps(peak) > steps(self.max)
+        self.argmax[better] = np.rint(ranked * decimal_scale(peak)[:, None]).argmax(axis=1)[better] + start
+        np.maximum(self.max, peak, out=self.max)
         self.count += values.shape[1] if valid is None else valid.sum(axis=1)
         self.total += values.sum(axis=1) if valid is None else np.where(valid, values, 0.0).sum(axis=1)
         bins = np.log10(np.maximum(ranked, 10.0**LOWEST))
         bins -= LOWEST
         bins *= PER_DECADE
+        bins += EDGE
         # Truncation is floor here: everything is nonnegative. `max - 1` keeps the topmost edge inside.
         index = np.minimum(bins.astype(np.int64), BINS - 1) + self._shift
         flat = index.ravel() if valid is None else index[valid]
@@ -60,6 +63,6 @@ class Stream:
         return float(min(edge, self.max[frame]))
 
     def decades(self, frame: int) -> dict[int, int]:
-        """Counts by decade: key k counts values in [10^k, 10^(k+1)); zeros and what is below 1e-18 are under -18."""
+        """Counts by decade: key k counts values in [10^k, 10^(k+1)); all below 1e-14, zeros among them, are under -15."""
         counts = self.histogram[frame].reshape(-1, PER_DECADE).sum(axis=1)
         return {LOWEST + i: int(c) for i, c in enumerate(counts) if c}

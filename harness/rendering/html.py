@@ -15,10 +15,11 @@ from markupsafe import escape
 from harness.rendering import scripts
 from harness.rendering.figures import apart, distribution, skeletons
 from harness.rendering.markdown import render_markdown
-from harness.report.document import PairResult, Report, Source
+from harness.report.document import Report, Source
 from harness.report.explanation import Explanation
 from harness.report.model_parts import Link, ParameterPair
 from harness.report.proven import for_all, proven_text
+from harness.report.results import PairResult
 from harness.report.sentences import change_of, changed_text, difference, moved_text
 from harness.report.source_parts import FrameResult
 from harness.report.tested import further_out, own_description

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import json
-import stat
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from harness.errors import InputError
+from harness.reading import REPORT_BYTES, read_text
 from harness.rendering.html import render_index
 from harness.report.document import Report
-from harness.report.json_file import FORMAT, read_report, schema
+from harness.report.json_file import FORMAT, report_of, schema
 from harness.report.text import plain
 from harness.writing import locked, put
 
 SCHEMA_NAME = "report.schema.json"
-LARGEST = 64_000_000  # bytes
+BEGINNING = 200  # letters, which name the format of a document
 OTHER_DOCUMENTS = FORMAT.partition(" ")[0]  # how the formats of all our documents begin
 TOLD = 5  # files named in the line on stderr
 LONGEST = 200  # letters of a name or a reason
@@ -80,17 +80,11 @@ def _reports(folder: Path) -> tuple[list[Report], list[LeftOut]]:
 
 def _read(path: Path) -> Report | None:
     """The report that a file holds; None if it is another document of ours. Raises InputError and what reading raises."""
-    state = path.stat()
-    if not stat.S_ISREG(state.st_mode):
-        raise InputError("expected a file", where=path)
-    if state.st_size > LARGEST:
-        raise InputError(f"expected at most {LARGEST} bytes, got {state.st_size}", where=path)
+    text = read_text(path, REPORT_BYTES)
     try:
-        report = read_report(path)
+        report = report_of(text, path)
     except InputError:
-        with path.open(encoding="utf-8", errors="replace") as file:
-            head = file.read(200)
-        if OTHER_DOCUMENTS in head and FORMAT not in head:
+        if OTHER_DOCUMENTS in text[:BEGINNING] and FORMAT not in text[:BEGINNING]:
             return None
         raise
     if path.stem != report.robot.name:

@@ -1,22 +1,34 @@
 """The report document: typed once; JSON Schema is generated from these types and every format is rendered from them.
 
 Units are metres and radians. Everything that varies between two equal runs (times, versions, host) is in `environment`.
+Computed numbers are written to the digits that mean something, so that the rest does not depend on the processor: their types
+do that, see `harness.digits`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
+from harness.digits import coordinate
 from harness.report.explanation import Explanation
 from harness.report.model_parts import SideBySide, Trees
 from harness.report.notebook import html_lines, html_table, text_table
-from harness.report.parts import Configuration, Count, Finite, Matrix, NonNegative, Part, RobotName, Rotation, Vector
+from harness.report.parts import (
+    Configuration,
+    Count,
+    Finite,
+    Matrix,
+    NonNegative,
+    Part,
+    RobotName,
+)
 from harness.report.pose import Pose
 from harness.report.proof_parts import Certificate, Theorem
 from harness.report.regression import Regression
+from harness.report.results import Lint, PairResult, PublishedResult
 from harness.report.source_parts import FrameResult, Reproducer, Tolerance, TraitNote, Validity
 from harness.report.tested_parts import Tested
 from harness.report.text import metres, plain, radians
@@ -118,46 +130,6 @@ class Frame(Part):
     measured_from: str = ""
 
 
-class PairResult(Part):
-    """Largest discrepancies of two sources over the subset of configurations."""
-
-    a: str
-    b: str
-    position: NonNegative
-    position_frame: str
-    rotation: NonNegative
-    rotation_frame: str
-
-
-class PublishedResult(Part):
-    """A published placement, as claimed and as computed by the in-house FK. Errors are largest entry differences."""
-
-    configuration: str
-    frame: str
-    relative_to: str
-    provenance: str
-    status: Literal["holds", "wrong"]
-    found: Literal["holds", "wrong"]
-    reason: str
-    claimed_position: Vector
-    claimed_rotation: Rotation | None
-    computed: Matrix
-    computed_rpy: Vector
-    tolerance: NonNegative
-    rotation_tolerance: NonNegative
-    position_error: NonNegative
-    rotation_error: NonNegative | None
-
-
-class Lint(Part):
-    """A finding about the URDF, the table or the mapping."""
-
-    code: str
-    level: Literal["error", "warning", "note"]
-    subject: str
-    message: str
-
-
 class Robot(Part):
     """The robot model the report is about. Placements are expressed in the frame `base`."""
 
@@ -169,7 +141,7 @@ class Robot(Part):
     joints: list[str]
     lower: list[Finite]
     upper: list[Finite]
-    reach: NonNegative
+    reach: Annotated[NonNegative, AfterValidator(coordinate)]
     hashes: dict[str, str]
 
     @model_validator(mode="after")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from harness.report.parts import Finite, NonNegative, Part
+from harness.report.parts import Coordinate, Discrepancy, Part
 
 
 class OneChange(Part):
@@ -16,7 +16,7 @@ class OneChange(Part):
     side: Literal["a", "b", "between", "source"]
     subject: str = ""
     parameter: str = ""
-    size: Finite = 0.0
+    size: Coordinate = 0.0
     unit: Literal["m", "rad", ""] = ""
 
 
@@ -35,7 +35,7 @@ class Explanation(Part):
 
     changes: list[Change] = []
     unexplained: str = ""
-    before_position: NonNegative = 0.0
-    before_rotation: NonNegative = 0.0
-    after_position: NonNegative = 0.0
-    after_rotation: NonNegative = 0.0
+    before_position: Discrepancy = 0.0
+    before_rotation: Discrepancy = 0.0
+    after_position: Discrepancy = 0.0
+    after_rotation: Discrepancy = 0.0

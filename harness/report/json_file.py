@@ -29,7 +29,12 @@ def to_json(report: Report) -> str:
 
 def read_report(path: Path) -> Report:
     """Read a report document. Raises InputError if it cannot be read or is not one of this version."""
-    data = parsed_json(read_text(path, REPORT_BYTES), path)
+    return report_of(read_text(path, REPORT_BYTES), path)
+
+
+def report_of(text: str, path: Path) -> Report:
+    """The report document that a text is. path: for messages. Raises InputError if it is none of this version."""
+    data = parsed_json(text, path)
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise InputError(f'expected a document with "format": "{FORMAT}"', where=path)
     if data.get("version") != VERSION:

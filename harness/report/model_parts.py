@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from harness.report.parts import Count, Finite, Part
+from harness.report.parts import Coordinate, Count, Part
 
 
 class Link(Part):
@@ -43,9 +43,9 @@ class ParameterPair(Part):
     subject: str
     parameter: str
     unit: Literal["m", "rad"]
-    table: Finite
-    urdf: Finite
-    difference: Finite
+    table: Coordinate
+    urdf: Coordinate
+    difference: Coordinate
     marked: bool
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from harness.report.parts import Matrix, Part
+from pydantic import model_validator
+
+from harness.report.parts import FineMatrix, Part, anchor
 from harness.report.source_parts import At
 
 
@@ -10,8 +12,13 @@ class FramePair(Part):
     """One mapped frame as the reference and as the source place it, both in the base frame of the report."""
 
     frame: str
-    reference: Matrix
-    source: Matrix
+    reference: FineMatrix
+    source: FineMatrix
+
+    @model_validator(mode="after")
+    def _written_side_by_side(self) -> FramePair:
+        anchor(self.reference, self.source)
+        return self
 
 
 class Pose(Part):

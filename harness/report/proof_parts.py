@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from harness.report.parts import Configuration, Finite, NonNegative, Part
+from harness.report.parts import Configuration, Finite, LowerBound, Part, UpperBound
 
 Equality = Literal["equal", "equal but for the digits of pi", "not equal", "not decided"]
 
@@ -19,11 +19,11 @@ class FrameBound(Part):
     """
 
     frame: str
-    position_upper: NonNegative
-    position_found: NonNegative
-    rotation_upper: NonNegative
-    rotation_found: NonNegative
-    slope: NonNegative | None
+    position_upper: UpperBound
+    position_found: LowerBound
+    rotation_upper: UpperBound
+    rotation_found: LowerBound
+    slope: UpperBound | None
     method: Literal["constant", "joints", "coefficients", "grid"]
 
 

@@ -7,9 +7,18 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from harness.report.parts import Configuration, Count, Matrix, NonNegative, Part
+from harness.digits import as_fine_as
+from harness.report.parts import (
+    Configuration,
+    Count,
+    Discrepancy,
+    FineMatrix,
+    NonNegative,
+    Part,
+    anchor,
+)
 from harness.report.verdicts import FrameVerdict
 
 Decade = Annotated[str, Field(pattern=r"^-?[0-9]{1,3}$")]  # a power of ten
@@ -25,16 +34,21 @@ class At(Part):
 
 class Statistics(Part):
     """Of one discrepancy, over all configurations. Quantiles are upper bounds, at most 15.5 % high; `decades` counts
-    values by power of ten."""
+    values by power of ten, under -15 all that are below 1e-14. `worst` is the first configuration with this `max`."""
 
     count: Count
-    max: NonNegative
-    mean: NonNegative
-    p50: NonNegative
-    p95: NonNegative
-    p99: NonNegative
+    max: Discrepancy
+    mean: Discrepancy
+    p50: Discrepancy
+    p95: Discrepancy
+    p99: Discrepancy
     decades: dict[Decade, Count]
     worst: At | None
+
+    @field_validator("mean")
+    @classmethod
+    def _no_finer_than_the_largest(cls, mean: float, info: ValidationInfo) -> float:
+        return as_fine_as(mean, info.data.get("max", mean))
 
 
 class Tolerance(Part):
@@ -74,10 +88,15 @@ class Reproducer(Part):
 
     frame: str
     q: Configuration
-    position: NonNegative
-    rotation: NonNegative
-    reference_placement: Matrix
-    source_placement: Matrix
+    position: Discrepancy
+    rotation: Discrepancy
+    reference_placement: FineMatrix
+    source_placement: FineMatrix
+
+    @model_validator(mode="after")
+    def _written_side_by_side(self) -> Reproducer:
+        anchor(self.reference_placement, self.source_placement)
+        return self
 
 
 class TraitNote(Part):
@@ -96,8 +115,8 @@ class Validity(Part):
 
     checked: Count
     invalid: Count
-    residual: NonNegative
+    residual: Discrepancy
     first: At | None = None
     first_frame: str = ""
-    again: NonNegative = 0.0
+    again: Discrepancy = 0.0
     again_at: At | None = None

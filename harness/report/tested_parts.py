@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from harness.report.parts import Configuration, Count, NonNegative, Part
+from harness.report.parts import Configuration, Count, Discrepancy, NonNegative, Part
 
 DESCRIPTIONS = {"dh": "dh.csv", "urdf": "the URDF"}
 
@@ -15,8 +15,8 @@ class TestedKind(Part):
     name: str
     count: Count
     calls: Count
-    position: NonNegative
-    rotation: NonNegative
+    position: Discrepancy
+    rotation: Discrepancy
 
 
 class TestedAt(Part):
@@ -26,22 +26,22 @@ class TestedAt(Part):
     q: Configuration
     frame: str
     turns: NonNegative
-    position: NonNegative
-    rotation: NonNegative
+    position: Discrepancy
+    rotation: Discrepancy
 
 
 class TestedTwice(Part):
     """Two answers to one configuration: the largest change of an entry, how large rounding lets it be, how it was asked the
     first and the second time, and how far each answer is off [m], if there is a description to tell."""
 
-    change: NonNegative
-    allowed: NonNegative
+    change: Discrepancy
+    allowed: Discrepancy
     q: Configuration
     frame: str
     first: str
     second: str
-    first_off: NonNegative | None = None
-    second_off: NonNegative | None = None
+    first_off: Discrepancy | None = None
+    second_off: Discrepancy | None = None
 
 
 class Tested(Part):
@@ -61,10 +61,10 @@ class Tested(Part):
     calls: Count
     turns: NonNegative
     kinds: list[TestedKind]
-    limit: NonNegative
+    limit: Discrepancy
     ignored_step: NonNegative = 0.0
-    position: NonNegative = 0.0
-    rotation: NonNegative = 0.0
+    position: Discrepancy = 0.0
+    rotation: Discrepancy = 0.0
     worst: TestedAt | None = None
     caught: TestedAt | None = None
     beyond: TestedAt | None = None

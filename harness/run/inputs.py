@@ -7,7 +7,6 @@ import hashlib
 import json
 import platform
 import shutil
-import stat
 import sys
 from collections.abc import Sequence
 from functools import cache
@@ -16,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from harness.engines.registry import adapter_of
-from harness.errors import CrosscheckError
+from harness.errors import CrosscheckError, InputError
+from harness.reading import digest
 from harness.run.outcome import Outcome, Run
 from harness.se3 import Array
 from harness.version import __version__
@@ -43,7 +43,7 @@ def inputs_of(run: Run) -> dict[str, str]:
     inputs = {
         "the harness": f"{__version__} {_code()}",
         "Python or NumPy": f"{sys.version} {np.__version__} {platform.machine()}",
-        **{f"the file {name}": digest for name, digest in run.model.hashes.items()},
+        **{f"the file {name}": sha for name, sha in run.model.hashes.items()},
         "the set of configurations": _digest(configurations.fixed_q, configurations.lower, configurations.upper),
     }
     return inputs | {f"{SOURCE}{o.name}": _source(o, run.model.folder) for o in run.outcomes if o.bound is not None}
@@ -60,10 +60,10 @@ def _source(outcome: Outcome, model: Path) -> str:
 
 
 def _digest(*arrays: Array) -> str:
-    digest = hashlib.sha256()
+    sha = hashlib.sha256()
     for array in arrays:
-        digest.update(str(array.shape).encode() + np.ascontiguousarray(array).tobytes())
-    return digest.hexdigest()
+        sha.update(str(array.shape).encode() + np.ascontiguousarray(array).tobytes())
+    return sha.hexdigest()
 
 
 def _files(command: Sequence[str], folder: Path | None, model: Path) -> list[str]:
@@ -86,17 +86,14 @@ def _adapter_code(source: str) -> str:
 @cache
 def _code() -> str:
     """A digest of the harness itself: who works on it has the same version all day."""
-    digest = hashlib.sha256()
+    sha = hashlib.sha256()
     for path in sorted(Path(__file__).parents[1].rglob("*.py")):
-        digest.update(_file(path).encode())
-    return digest.hexdigest()
+        sha.update(_file(path).encode())
+    return sha.hexdigest()
 
 
 def _file(path: Path) -> str:
     """A digest of a regular file; empty if it is none, or too large."""
-    with contextlib.suppress(OSError, ValueError):
-        state = path.stat()
-        if stat.S_ISREG(state.st_mode) and state.st_size <= LARGEST_PROGRAM:
-            with path.open("rb") as file:
-                return hashlib.sha256(file.read(LARGEST_PROGRAM)).hexdigest()
+    with contextlib.suppress(InputError):
+        return digest(path, LARGEST_PROGRAM)[1]
     return ""

@@ -8,6 +8,7 @@ import numpy as np
 
 from harness import se3
 from harness.description.model import RobotModel
+from harness.digits import discrepancy
 from harness.run.binding import Bound
 from harness.se3 import Array
 
@@ -68,7 +69,8 @@ class RigidOffsets:
         if not loose:
             return
         for name, offset in measure_rigid(self._model, self._in_house, source, self._lattice).items():
-            if name in loose and offset.spread < self._spread(name):
+            # By as much as is written: else rounding would choose between two that are alike.
+            if name in loose and discrepancy(offset.spread) < discrepancy(self._spread(name)):
                 self.offsets[name] = offset
 
     def _spread(self, name: str) -> float:

@@ -19,13 +19,13 @@ from pathlib import Path
 
 import platformdirs
 
-from harness.errors import UntrustedError, command_line
+from harness.errors import InputError, UntrustedError, command_line
+from harness.reading import digest
 from harness.writing import replace_file
 
 DATA = ("dh.csv", "model.toml", "frames.toml", "configurations.toml")
 VERSION_CONTROL = (".git", ".hg", ".svn")
 MOST_FILES, MOST_BYTES = 2000, 64 * 2**20  # of one folder; beyond, nothing is remembered
-PIECE = 1 << 20
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,14 +64,14 @@ def check_allowed(programs: Sequence[Program]) -> None:
         raise program.refusal("read it, then allow it with Options(trust=True)")
 
 
-class _TooLarge(Exception):
-    """More files, or more bytes, than are looked at."""
+class _TooMany(Exception):
+    """More files than are looked at."""
 
 
 def fingerprint(program: Program) -> str | None:
     """SHA-256 over the command and the files that belong to it. None if they are too many or too large, or cannot be read."""
-    digest, left = hashlib.sha256(), MOST_BYTES
-    digest.update(json.dumps(program.written).encode("utf-8", "surrogatepass"))
+    sha, left = hashlib.sha256(), MOST_BYTES
+    sha.update(json.dumps(program.written).encode("utf-8", "surrogatepass"))
     try:
         for count, path in enumerate(_files(program)):
             if count == MOST_FILES:
@@ -80,10 +80,10 @@ def fingerprint(program: Program) -> str | None:
             target = os.readlink(path) if path.is_symlink() else ""
             size, content = _content(path, left)
             left -= size
-            digest.update(json.dumps([name, target, content]).encode("utf-8", "surrogatepass"))
-    except (OSError, _TooLarge):
+            sha.update(json.dumps([name, target, content]).encode("utf-8", "surrogatepass"))
+    except (OSError, InputError, _TooMany):
         return None
-    return digest.hexdigest()
+    return sha.hexdigest()
 
 
 def _files(program: Program) -> Iterator[Path]:
@@ -100,7 +100,7 @@ def _files(program: Program) -> Iterator[Path]:
                 named.discard(path)
                 yield path
         if (count := count + 1) > MOST_FILES:
-            raise _TooLarge
+            raise _TooMany
     yield from sorted(named)
 
 
@@ -117,7 +117,7 @@ def _named(program: Program) -> Iterator[Path]:
 def _content(path: Path, limit: int) -> tuple[int, str]:
     """Size and SHA-256 of a regular file; size 0 and its kind for anything else, which is not opened.
 
-    Raises _TooLarge beyond `limit` bytes, OSError if it cannot be read.
+    Raises InputError beyond `limit` bytes or if it cannot be read, OSError if it cannot be asked for its kind.
     """
     try:
         kind = stat.S_IFMT(path.stat().st_mode)
@@ -125,14 +125,7 @@ def _content(path: Path, limit: int) -> tuple[int, str]:
         return 0, "nothing"
     if kind != stat.S_IFREG:
         return 0, f"kind {kind}"
-    digest, size = hashlib.sha256(), 0
-    with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
-        while piece := file.read(PIECE):
-            size += len(piece)
-            if size > limit:
-                raise _TooLarge
-            digest.update(piece)
-    return size, digest.hexdigest()
+    return digest(path, limit)
 
 
 def allowed_folder() -> Path:

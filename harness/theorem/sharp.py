@@ -16,6 +16,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from harness.digits import first_of_largest
 from harness.se3 import Array
 from harness.theorem.coefficients import ROUNDING, Coefficients
 
@@ -47,14 +48,14 @@ def highest(function: Coefficients, starts: Array) -> Top:
         starts: configurations (S, n) [rad or m].
     """
     norms = np.linalg.norm(function.values(starts), axis=1)
-    q, best = starts[norms.argmax()].copy(), float(norms.max())
+    q, best = starts[first_of_largest(norms)].copy(), float(norms.max())
     moving = [j for j in range(starts.shape[1]) if function.frequencies[:, j].any() or (function.linear == j).any()]
     for width in WIDTHS:
         for j in moving:
             tries = _tries(function, q, j, width)
             norms = np.linalg.norm(function.along(q, j, tries), axis=1)
-            if norms.max() > best:
-                q[j], best = tries[norms.argmax()], float(norms.max())
+            if norms.max() > best * (1.0 + 1e-9):  # less is a matter of rounding
+                q[j], best = tries[first_of_largest(norms)], float(norms.max())
     return Top(best, q)
 
 
@@ -177,14 +178,14 @@ def _largest_on(function: Coefficients, axes: list[_Axis]) -> tuple[float, tuple
     """The largest norm on the grid, and at which node of each axis it is. One axis is walked, to bound the memory."""
     if not axes:
         return float(np.linalg.norm(function.real.sum(axis=0))), ()
-    best, where = -1.0, (0,) * len(axes)
+    top, best, where = 0.0, 0.0, (0,) * len(axes)
     for first, values in _slices(function, axes):
         squares = np.einsum("d...,d...->...", values, values)
-        index = int(squares.argmax())
-        size = float(squares.flat[index])
-        if size > best:
+        index = first_of_largest(squares.ravel())
+        size, top = float(squares.flat[index]), max(top, float(squares.max()))
+        if size > best * (1.0 + 1e-9):
             best, where = size, (first, *(int(i) for i in np.unravel_index(index, squares.shape)))
-    return math.sqrt(best), where
+    return math.sqrt(top), where
 
 
 def _slices(function: Coefficients, axes: list[_Axis]) -> Iterator[tuple[int, Array]]:

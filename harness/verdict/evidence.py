@@ -6,6 +6,7 @@ from typing import Any
 
 from harness.cause.changes import Change
 from harness.description.configurations import ConfigurationSet
+from harness.digits import measured_bounds
 from harness.report import explanation as reasons
 from harness.report import proof_parts as proofs
 from harness.report import source_parts as parts
@@ -25,7 +26,7 @@ def certificate(run: Run, outcome: Outcome) -> proofs.Certificate | None:
     if certified is None:
         return None
     pairs = zip(certified.frames, certified.bounds, strict=True) if certified.bounds else ()
-    frames = [_bound(run.model.frames.frames[index].name, bound) for index, bound in pairs]
+    frames = [_bound(run, run.model.frames.frames[index].name, bound) for index, bound in pairs]
     return proofs.Certificate(status="certified" if frames else "refused", reason=certified.reason, frames=frames)
 
 
@@ -34,20 +35,23 @@ def theorem(run: Run) -> proofs.Theorem | None:
     if run.theorem is None:
         return None
     return proofs.Theorem(
-        frames=[_bound(name, bound) for name, bound in run.theorem.frames.items()],
+        frames=[_bound(run, name, bound) for name, bound in run.theorem.frames.items()],
         equality=dict(run.theorem.equality),
         worst={name: bound.worst[0].tolist() for name, bound in run.theorem.frames.items()},
         slides={joint: proofs.Range(lower=lower, upper=upper) for joint, (lower, upper) in run.theorem.ranges.items()},
     )
 
 
-def _bound(frame: str, bound: FrameBound) -> proofs.FrameBound:
+def _bound(run: Run, frame: str, bound: FrameBound) -> proofs.FrameBound:
+    position, rotation = (bound.position_found, bound.position), (bound.rotation_found, bound.rotation)
+    if frame in run.offsets and any(bound.worst.ravel()):
+        position, rotation = measured_bounds(*position), measured_bounds(*rotation)
     return proofs.FrameBound(
         frame=frame,
-        position_upper=bound.position,
-        position_found=bound.position_found,
-        rotation_upper=bound.rotation,
-        rotation_found=bound.rotation_found,
+        position_upper=position[1],
+        position_found=position[0],
+        rotation_upper=rotation[1],
+        rotation_found=rotation[0],
         slope=bound.slope,
         method=bound.method,
     )

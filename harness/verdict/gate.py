@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from harness.errors import ExitCode
 from harness.report import document as doc
+from harness.report import results
 from harness.report.proof_parts import Theorem
 from harness.report.proven import proven_text
 from harness.report.regression import Regression
@@ -28,7 +29,7 @@ def combined(codes: Iterable[int]) -> int:
 def gate(
     robot: str,
     sources: Sequence[doc.Source],
-    published: Sequence[doc.PublishedResult],
+    published: Sequence[results.PublishedResult],
     settings: doc.Settings,
     theorem: Theorem | None,
 ) -> doc.GateVerdict:
@@ -93,7 +94,7 @@ def _proven(compared: list[doc.Source], theorem: Theorem | None) -> str:
     return f"; {text}{' (accepted deviations aside)' if aside else ''}" if text else ""
 
 
-def _misfiled(claims: list[doc.PublishedResult]) -> str:
+def _misfiled(claims: list[results.PublishedResult]) -> str:
     first, more = claims[0], len(claims) - 1
     rotation = "" if first.rotation_error is None else f", {first.rotation_error:.2g} in the rotation"
     return (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from typing import TypedDict
 
+from harness.digits import coordinate
 from harness.engines.base import Refusal, Trait
 from harness.engines.registry import adapter_of
 from harness.errors import CrosscheckError, EngineUnavailable, InputError
@@ -78,7 +79,7 @@ def assemble_source(run: Run, outcome: Outcome) -> doc.Source:
 
 def _floor(run: Run, names: tuple[str, str]) -> float:
     """What rounding alone may change, in float64 or in what an engine computes in, if that is coarser [m, rad]."""
-    reach = run.comparison.reach if run.comparison else 0.0
+    reach = coordinate(run.comparison.reach) if run.comparison else 0.0
     floor = FLOAT64.limit * (1.0 + reach)
     for name in names:
         with contextlib.suppress(EngineUnavailable, InputError):  # a program, or a broken adapter that says so itself

@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 from harness.engines import requirements
 from harness.engines.base import Description, Engine
 from harness.errors import EngineFailed
+from harness.kernels import kernels
 from harness.workers import protocol
 from harness.workers.child import Child, ChildError
 from harness.workers.environments import THREAD_VARIABLES, own_environment, where
@@ -141,7 +142,7 @@ class Workers:
                 return ProcessEngine(source, served, protocol.AGAIN + greeting, self.limits, adapter)
         # A program of the user's must not change its own folder: what is remembered of it is a hash over the files there.
         own = own_environment(command[0]) if adapter else {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
-        env = {**dict.fromkeys(THREAD_VARIABLES, "1"), **own}
+        env = {**dict.fromkeys(THREAD_VARIABLES, "1"), **own, **kernels()}
         try:
             with self._lock:
                 if self._closing.is_set():

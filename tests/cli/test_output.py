@@ -6,6 +6,7 @@ import errno
 import io
 import json
 import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -17,6 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harness.cli.output import Outlet, json_line
+from harness.description.locate import default_models_dir
 
 FAST = ("--source", "urdf:pinocchio", "--samples", "1", "--no-certify", "--no-explain")
 FULL = "error: standard output: cannot be written: No space left on device\n"
@@ -110,6 +112,28 @@ def test_commands_whose_output_is_all(tmp_path: Path, command: str) -> None:
     for end in ("| true", ">&-", "2>&- | true"):
         assert shell(f"{CROSSCHECK} {command} {end}", tmp_path) == (141, "")
     assert shell(f"{CROSSCHECK} {command} > /dev/full", tmp_path) == (2, FULL)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "accept sixr",
+        "render reports/sixr.json --out rendered",
+        "derive-dh {urdf} --out derived",
+        "export-urdf sixr --out sixr.urdf",
+    ],
+)
+def test_commands_whose_result_is_a_file(tmp_path: Path, command: str) -> None:
+    """That a file was written is so whether or not somebody reads the line that says it."""
+    assert shell(f"{CROSSCHECK} run sixr {' '.join(FAST)} --quiet", tmp_path) == (0, "")
+    command = command.format(urdf=default_models_dir().parent / "urdf" / "sixr.urdf")
+    before = {p.name for p in tmp_path.rglob("*")}
+    for end in ("| true", ">&-"):
+        assert shell(f"{CROSSCHECK} {command} {end}", tmp_path) == (0, "")
+        made = {p.name for p in tmp_path.rglob("*")} - before
+        assert made
+        for path in (tmp_path / name for name in ("derived", "rendered", "sixr.urdf", "reports/accepted")):
+            shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
 
 
 @pytest.mark.parametrize(

@@ -15,9 +15,9 @@ from lxml import html as lxml_html
 
 from harness.description.model import RobotModel, load_model
 from harness.errors import InputError
+from harness.reading import REPORT_BYTES
 from harness.rendering.files import prepare, write, write_index, write_report, write_summary
 from harness.rendering.html import render_html
-from harness.rendering.index import LARGEST
 from harness.rendering.junit import render_junit
 from harness.rendering.markdown import render_markdown
 from harness.report.document import Report
@@ -167,7 +167,7 @@ def test_the_index_leaves_out_what_it_cannot_read_and_says_so(
     os.mkfifo(tmp_path / "d.json")
     (tmp_path / "e.json").symlink_to("/dev/zero")
     with (tmp_path / "f.json").open("wb") as file:
-        file.truncate(LARGEST + 1)
+        file.truncate(REPORT_BYTES + 1)
     (tmp_path / "g.json").write_bytes(b"\xff\xfe\xfd")
     (tmp_path / "h.json").write_text(text.replace('"worst_frame": "', '"worst_frame": "no '))
     (tmp_path / "i.json").write_text('{"format": "fk-crosscheck report", "version": "0.1"}')

@@ -22,7 +22,7 @@ from harness.engines.registry import Registered
 from harness.engines.urdf_pinocchio import UrdfPinocchio
 from harness.engines.urdf_yourdfpy import UrdfYourdfpy
 from harness.errors import InputError
-from harness.report import source_parts as parts
+from harness.report import tested_parts as parts
 from harness.report.document import Report, Source
 from harness.report.json_file import to_json
 from harness.run.described import described
