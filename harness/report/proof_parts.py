@@ -37,7 +37,8 @@ class Range(Part):
 class Theorem(Part):
     """What is proven of the table and the URDF, from their numbers alone, for every angle of every joint that turns.
 
-    equality: for each frame, whether both are the same function. worst: for each frame the configuration of `position_found`.
+    equality: for each frame, whether both are the same function. worst: the configuration of `position_found`, for
+    frames at which that is more than rounding.
     slides: the range that each joint which slides is looked at in.
     """
 
@@ -54,7 +55,7 @@ class Theorem(Part):
     def require(self, frames: set[str], joints: int) -> None:
         """Raise ValueError unless it speaks of these frames alone, of each in full, and of so many joints."""
         own = [bound.frame for bound in self.frames]
-        if not set(own) <= frames or set(own) != set(self.equality) or set(own) != set(self.worst):
+        if not set(own) <= frames or set(own) != set(self.equality) or not set(self.worst) <= set(own):
             raise ValueError(f"expected bounds, equality and configurations of frames of the report, got {', '.join(own)}")
         if any(len(q) != joints for q in self.worst.values()):
             raise ValueError(f"expected {joints} joint values in each configuration of the theorem")

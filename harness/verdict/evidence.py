@@ -14,6 +14,8 @@ from harness.report.pose import FramePair, Pose
 from harness.run.outcome import Explained, Outcome, Run
 from harness.theorem.prove import FrameBound
 
+WORTH_TELLING = 1e-11  # [m]: where two descriptions differ by less is a matter of the last digits
+
 
 def at(configurations: ConfigurationSet, index: int, seed: int) -> parts.At:
     """A configuration by its index, with its values."""
@@ -37,14 +39,14 @@ def theorem(run: Run) -> proofs.Theorem | None:
     return proofs.Theorem(
         frames=[_bound(run, name, bound) for name, bound in run.theorem.frames.items()],
         equality=dict(run.theorem.equality),
-        worst={name: bound.worst[0].tolist() for name, bound in run.theorem.frames.items()},
+        worst={n: b.worst[0].tolist() for n, b in run.theorem.frames.items() if b.position_found > WORTH_TELLING},
         slides={joint: proofs.Range(lower=lower, upper=upper) for joint, (lower, upper) in run.theorem.ranges.items()},
     )
 
 
 def _bound(run: Run, frame: str, bound: FrameBound) -> proofs.FrameBound:
     position, rotation = (bound.position_found, bound.position), (bound.rotation_found, bound.rotation)
-    if frame in run.offsets and any(bound.worst.ravel()):
+    if frame in run.offsets:
         position, rotation = measured_bounds(*position), measured_bounds(*rotation)
     return proofs.FrameBound(
         frame=frame,
