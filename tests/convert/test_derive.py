@@ -188,7 +188,7 @@ CHAINS = [
 
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 @pytest.mark.parametrize(("name", "base", "tip"), CHAINS)
-def test_derived_tables_pass_the_gate_with_a_certificate(name: str, base: str, tip: str, convention: Convention) -> None:
+def test_derived_tables_are_proven_close_to_their_urdf(name: str, base: str, tip: str, convention: Convention) -> None:
     derived = derive(read_urdf(packaged(name)), base, tip, convention, "urdf:pinocchio")
     report = verify(derived, "robot", "urdf:pinocchio", None)
     assert report.verdict.exit_code == 0, report.verdict.sentence

@@ -93,6 +93,8 @@ BROKEN: dict[str, tuple[Callable[[Document], object], str]] = {
         lambda d: source(d)["certificate"]["frames"][0].update(frame=""),
         "a frame that it does not have, ''",
     ),
+    "a frame of the theorem": (lambda d: d["theorem"]["frames"][0].update(frame="nowhere"), "of frames of the report"),
+    "an equality missing": (lambda d: d["theorem"]["equality"].popitem(), "of frames of the report"),
     "a certificate of nothing": (lambda d: source(d)["certificate"].update(frames=[]), "a bound of at least one frame"),
     "a source missing": (lambda d: d["sources"].pop(), "a source that it does not have"),
     "a pair of nobody": (lambda d: d["pairs"][0].update(b="nobody"), "a source that it does not have, 'nobody'"),
