@@ -6,7 +6,6 @@ Prints one row a figure with its target and exits 1 if one is missed. N = 100 00
 from __future__ import annotations
 
 import gc
-import math
 import statistics
 import subprocess
 import sys
@@ -19,21 +18,11 @@ import pinocchio as pin
 import pytorch_kinematics as pk
 import torch
 
-import harness.run.robot
-from harness.certificate.interpolation import Axis, grid
-from harness.certificate.joint_axes import joint_axes
-from harness.certificate.links import Link, certify_links, sample_links
-from harness.description.dh import DHRow, DHTable
 from harness.description.locate import default_models_dir, find_model
 from harness.description.model import RobotModel, load_model
 from harness.engines.dh_numpy import DHNumpy
-from harness.engines.dh_pinocchio import DHPinocchio
-from harness.run.binding import bind
-from harness.run.certifying import certify_all
 from harness.run.options import Options
-from harness.run.outcome import Run
 from harness.verdict.crosscheck import crosscheck
-from harness.workers.pool import Workers
 
 N = 100_000
 ROUNDS = 5
@@ -143,59 +132,6 @@ def memory_row() -> tuple[str, float, float, str]:
     return "peak memory, 1 000 000 less 10 000 samples [MB]", many - few, 100.0, "at most"
 
 
-def certificate_rows() -> list[tuple[str, float, float, str]]:
-    """Certifying dh:pinocchio, less 50 ms, over evaluating the grid once in both engines: UR5 (729) and Panda (2187)."""
-    rows = []
-    for robot, count in (("ur5", 729), ("panda", 2187)):
-        model = load_model(find_model(robot, default_models_dir()))
-        spent: list[float] = []
-        bound = [bind(adapter(model.table), model, {}) for adapter in (DHNumpy, DHPinocchio)]
-        nodes = grid(joint_axes(model))
-        if len(nodes) != count:
-            raise RuntimeError(f"expected {count} grid points, got {len(nodes)}")
-
-        def timed(run: Run, workers: Workers, spent: list[float] = spent) -> None:
-            start = time.perf_counter()
-            certify_all(run, workers)
-            spent.append(time.perf_counter() - start)
-
-        setattr(harness.run.robot, "certify_all", timed)  # noqa: B010 - not exported there, on purpose
-        ratios = []
-        for _ in range(ROUNDS + 1):
-            crosscheck(model, Options(samples=0, seed=0, sources=("dh:pinocchio",)))
-            once = min(seconds(lambda bound=bound, nodes=nodes: [b.raw(nodes) for b in bound]) for _ in range(3))  # type: ignore[misc]
-            ratios.append((spent[-1] - 0.050) / once)
-        print(f"certificate of {robot}: {statistics.median(spent) * 1e3:.0f} ms (median; informative)")
-        rows.append(
-            (f"(certificate of {robot} - 50 ms) / {count} evaluations in both", statistics.median(ratios[1:]), 3.0, "at most")
-        )
-    setattr(harness.run.robot, "certify_all", certify_all)  # noqa: B010
-    return rows
-
-
-def long_chain_row() -> tuple[str, float, float, str]:
-    """A 30-joint chain against the same with one link longer, link by link [s]."""
-    rows = tuple(DHRow(name=f"j{i}", kind="revolute", a=0.1, alpha=math.pi / 2 * (-1) ** i, d=0.05, theta=0.0) for i in range(30))
-    longer = (*rows[:12], DHRow(name="j12", kind="revolute", a=0.1001, alpha=math.pi / 2, d=0.05, theta=0.0), *rows[13:])
-    labels = [str(i) for i in range(1, 31)]
-    axes, links = [Axis(True, 1, 0.0, 2 * math.pi)] * 30, [Link(i - 1 if i else None, i, (i,)) for i in range(30)]
-
-    def work() -> object:
-        sampled = []
-        for table in (DHTable(longer), DHTable(rows)):
-            engine = DHPinocchio(table)
-            evaluate = lambda q, engine=engine: engine.placements(q, labels)[:, :, :3, :].transpose(0, 1, 3, 2)  # noqa: E731
-            sampled.append(sample_links(evaluate, axes, links, np.random.default_rng(0)))
-        return certify_links(sampled[0], sampled[1], axes, links, 30)
-
-    return (
-        "certificate of a 30-joint chain, link by link [s]",
-        statistics.median(seconds(work) for _ in range(ROUNDS)),
-        2.0,
-        "at most",
-    )
-
-
 def main() -> int:
     """Run everything and print the table."""
     model = load_model(find_model("ur5", default_models_dir()))
@@ -203,8 +139,6 @@ def main() -> int:
     for name, value, target, sense in [
         *engine_rows(model),
         overhead_row(model),
-        *certificate_rows(),
-        long_chain_row(),
         memory_row(),
     ]:
         met = value >= target if sense == "at least" else value <= target

@@ -10,6 +10,7 @@ A number that lies between two written ones may still become either: see docs/th
 
 from __future__ import annotations
 
+import math
 from bisect import bisect
 
 import numpy as np
@@ -34,8 +35,8 @@ def as_fine_as(x: float, largest: float) -> float:
 
 
 def upper_bound(x: float) -> float:
-    """An upper bound [m or rad], x >= 0, to the next 1e-13 (from 3 on 1e-6) that is not below it: it stays a bound."""
-    decimals = DECIMALS[max(1, bisect(CHANGES, x))]
+    """An upper bound [m or rad], x >= 0, to as many decimals as a discrepancy, and not below it: it stays a bound."""
+    decimals = DECIMALS[bisect(CHANGES, x)]
     written = round(x, decimals)
     return written if written >= x else round(written + 10.0**-decimals, decimals)
 
@@ -52,7 +53,7 @@ def anchored(reference: float, other: float) -> tuple[float, float]:
     """
     written, apart = round(reference, ANCHOR) + 0.0, other - reference
     there = written + (discrepancy(apart) if apart >= 0.0 else -discrepancy(-apart))
-    return written, round(there, DECIMALS[0]) + 0.0
+    return (written, round(there, DECIMALS[0]) + 0.0) if math.isfinite(there) else (reference, other)
 
 
 def steps(values: Array) -> Array:

@@ -18,7 +18,8 @@ from harness.comparison.statistics import Stream
 from harness.digits import anchored, as_fine_as, coordinate, discrepancy, upper_bound
 from harness.report.parts import Discrepancy
 from harness.report.pose import FramePair
-from harness.report.source_parts import FrameBound, Statistics, Validity
+from harness.report.proof_parts import FrameBound
+from harness.report.source_parts import Statistics, Validity
 
 SIZES = st.floats(1e-18, 1e6)
 
@@ -29,6 +30,7 @@ def test_a_number_that_is_read_back_is_written_the_same(x: float) -> None:
         assert write(write(x)) == write(x)
     pair = anchored(x, x + 1e-11)
     assert anchored(*pair) == pair
+    assert anchored(-1e308, 1e308) == (-1e308, 1e308)
 
 
 @given(SIZES)
@@ -70,7 +72,13 @@ def test_types_of_the_document_write_numbers() -> None:
     """Rounding is done where a document is built, by the types of its fields."""
     assert Validity(checked=1, invalid=0, residual=8.9e-16).residual == 0.0
     bound = FrameBound(
-        frame="f", position_upper=2.141e-12, position_found=2.141e-12, rotation_upper=0.0, rotation_found=4e-16, method="grid"
+        frame="f",
+        position_upper=2.141e-12,
+        position_found=2.141e-12,
+        rotation_upper=0.0,
+        rotation_found=4e-16,
+        slope=None,
+        method="grid",
     )
     assert (bound.position_upper, bound.position_found, bound.rotation_found) == (2.2e-12, 2.1e-12, 0.0)
     assert discrepancy in [getattr(part, "func", None) for part in Discrepancy.__metadata__]  # type: ignore[attr-defined]

@@ -15,6 +15,7 @@ from harness.cli.console import console
 from harness.cli.crash import attempt
 from harness.cli.output import Kept, json_line
 from harness.cli.shared import (
+    FreshSeed,
     Quantity,
     accepted_option,
     complete_robots,
@@ -71,6 +72,7 @@ class RunSettings:
     certify: bool
     explain: bool
     seed: int
+    probe_seed: int
     out: Path
     accepted: Path
     strict: bool
@@ -94,6 +96,7 @@ class RunSettings:
         return Options(
             samples=self.samples,
             seed=self.seed,
+            probe_seed=self.probe_seed,
             sources=self.sources,
             reference=self.reference,
             certify=self.certify,
@@ -140,6 +143,14 @@ class RunSettings:
 @click.option("--certify/--no-certify", default=True, show_default=True, help="Prove a bound for all configurations.")
 @click.option("--explain/--no-explain", default=True, show_default=True, help="Look for the cause of each disagreement.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random configurations.")
+@click.option(
+    "--probe-seed",
+    type=FreshSeed(),
+    default=0,
+    show_default=True,
+    metavar="N|fresh",
+    help="Seed of the configurations at which each engine is tested against its own description; fresh: a new one.",
+)
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("reports"), show_default=True, help="Folder for the reports."
 )
@@ -243,6 +254,7 @@ def _command(folder: Path, models: Path | None, options: Options) -> str:
     if options.reference != REFERENCE:
         words += ["--reference", options.reference]
     words += ["--samples", str(options.samples), "--seed", str(options.seed)]
+    words += ["--probe-seed", str(options.probe_seed)] if options.probe_seed and options.certify else []
     flags = {"--no-certify": not options.certify, "--no-explain": not options.explain, "--strict": options.strict}
     words += [flag for flag, wanted in flags.items() if wanted]
     # A path need not be text; the report is.

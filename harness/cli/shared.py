@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import functools
 import os
+import secrets
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -27,6 +28,7 @@ from harness.report.text import plain
 from harness.verdict.accepted import FOLDER
 
 LONGEST_TIMEOUT = 1e9  # [s], 30 years
+FRESH_SEEDS = 10**9  # short enough to be typed again
 
 Command = Callable[..., int]
 
@@ -49,6 +51,22 @@ class Quantity(click.types.FloatParamType):
 
 
 seconds = Quantity(LONGEST_TIMEOUT)
+
+
+class FreshSeed(click.types.IntParamType):
+    """A seed, or the word `fresh`: a new one."""
+
+    name = "seed"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Raises click's BadParameter."""
+        if value == "fresh":
+            return secrets.randbelow(FRESH_SEEDS)
+        try:
+            return int(super().convert(value, param, ctx))
+        except click.BadParameter:
+            self.fail(f"expected a whole number or fresh, got {shown(value)}", param, ctx)
+
 
 models_option = click.option(
     "--models",

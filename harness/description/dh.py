@@ -17,6 +17,7 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 
 from harness import se3
+from harness.description.written import Written
 from harness.errors import InputError, nearest
 
 Convention: TypeAlias = Literal["standard", "modified"]
@@ -55,7 +56,7 @@ class DHRow:
         Raises:
             ValueError: there are not four numbers.
         """
-        a, alpha, d, theta = (float(x) for x in numbers)
+        a, alpha, d, theta = (x if isinstance(x, Written) else float(x) for x in numbers)
         return cls(name=name, kind=kind, a=a, alpha=alpha, d=d, theta=theta)
 
 

@@ -20,6 +20,7 @@ import numpy as np
 from harness.description.dh import DHTable
 from harness.description.frames_file import FrameEntry, FramesFile
 from harness.description.urdf import Urdf
+from harness.description.values import Transform
 from harness.errors import MappingError, nearest
 from harness.se3 import Array
 
@@ -37,6 +38,7 @@ class MappedFrame:
         relation: how the offset is known: `identical` (there is none), `declared`, or `rigid` (it is measured).
         of: the other entry that a declared offset was given from, if any.
         offset: T_dh_name (4, 4) [m]; None for a rigid frame until it has been measured.
+        declared: the transforms that the offset is the product of, as the file writes them.
     """
 
     name: str
@@ -45,6 +47,7 @@ class MappedFrame:
     relation: Relation
     of: str | None
     offset: Array | None
+    declared: tuple[Transform, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -125,6 +128,7 @@ def _once(seen: dict[Any, int], item: Any, i: int, path: Path, key: str, what: s
 def _resolve(entry: FrameEntry, i: int, file: FramesFile, table: DHTable, path: Path) -> MappedFrame:
     """Follow `of` down to an entry with `dh`, composing the declared offsets."""
     offset, current, seen = entry.offset, entry, [entry.name]
+    transforms = [entry.transform] if entry.transform else []
     while current.of is not None:
         target = next((e for e in file.frame if e.name == current.of), None)
         if target is None:
@@ -140,6 +144,7 @@ def _resolve(entry: FrameEntry, i: int, file: FramesFile, table: DHTable, path: 
                 hint="give this entry dh and rigid = true instead",
             )
         offset, current = target.offset @ offset, target
+        transforms = [*([target.transform] if target.transform else []), *transforms]
         seen.append(current.name)
     label = str(current.dh)
     if label not in table.frames:
@@ -150,7 +155,13 @@ def _resolve(entry: FrameEntry, i: int, file: FramesFile, table: DHTable, path: 
         return MappedFrame(name=entry.name, dh=label, urdf=entry.urdf, relation="rigid", of=None, offset=None)
     declared = entry.of is not None or entry.xyz is not None or entry.rpy is not None
     return MappedFrame(
-        name=entry.name, dh=label, urdf=entry.urdf, relation="declared" if declared else "identical", of=entry.of, offset=offset
+        name=entry.name,
+        dh=label,
+        urdf=entry.urdf,
+        relation="declared" if declared else "identical",
+        of=entry.of,
+        offset=offset,
+        declared=tuple(transforms),
     )
 
 

@@ -36,11 +36,17 @@ class FrameEntry(Strict):
         return self
 
     @property
-    def offset(self) -> Array:
-        """Declared offset as (4, 4); identity if none is."""
+    def transform(self) -> Transform | None:
+        """The declared offset as it is written; None if none is."""
         if self.xyz is None and self.rpy is None:
-            return np.eye(4)
-        return Transform(xyz=self.xyz or [0.0] * 3, rpy=self.rpy or [0.0] * 3).matrix()
+            return None
+        return Transform(xyz=self.xyz or [0.0] * 3, rpy=self.rpy or [0.0] * 3)
+
+    @property
+    def offset(self) -> Array:
+        """The declared offset as (4, 4); identity if none is."""
+        transform = self.transform
+        return np.eye(4) if transform is None else transform.matrix()
 
 
 class JointEntry(Strict):

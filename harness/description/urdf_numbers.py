@@ -13,14 +13,13 @@ from pathlib import Path
 from lxml import etree
 
 from harness.description.values import LARGEST_ANGLE, LARGEST_LENGTH
+from harness.description.written import decimal, is_decimal
 from harness.errors import UrdfError
 
 # A factor or the part of a direction has no unit; larger ones than this overflow further on.
 LARGEST_FACTOR = 1e9
-LONGEST_NUMBER = 1_000
 SPACES = " \t\r\n\f\v"
 
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _SHOWN = 60
 
 
@@ -28,9 +27,9 @@ def parsed(text: str) -> tuple[float, ...] | None:
     """The numbers of a text, separated by ASCII white space; None if one is no number, or not finite."""
     values = []
     for word in re.split(f"[{SPACES}]+", text.strip(SPACES)):
-        if len(word) > LONGEST_NUMBER or not _NUMBER.fullmatch(word):
+        if not is_decimal(word):
             return None
-        values.append(float(word))
+        values.append(decimal(word))
     return tuple(values) if all(math.isfinite(value) for value in values) else None
 
 

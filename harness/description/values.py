@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,6 +16,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from harness import se3
+from harness.description.written import LONGEST_NUMBER, decimal, is_decimal, multiple_of_pi
 from harness.errors import ModelFileError
 
 # What a description can hold. Beyond these, float64 has no micrometre left, and sums and products overflow.
@@ -24,11 +26,8 @@ LARGEST_NUMBER = 1e9  # of anything else, and of what may be either
 LONGEST_NAME = 1000  # characters
 LONGEST_TEXT = 100_000  # characters
 
-# What a description can hold. Larger numbers are slips, and overflow as soon as they are multiplied.
-LARGEST_LENGTH = 1e9  # [m]
-LARGEST_ANGLE = 1e6  # [rad]
-
 _PI = re.compile(r"(?P<sign>[+-]?)\s*(?:(?P<times>[1-9]\d*)\s*\*\s*)?pi(?:\s*/\s*(?P<over>[1-9]\d*))?")
+_NOT_FINITE = re.compile(r"[+-]?(?:inf|infinity|nan)", re.IGNORECASE)
 _SHOWN = 60  # characters of a value in a message
 
 
@@ -74,14 +73,16 @@ def _too_large(value: object, largest: float, unit: str) -> str:
 
 def _from_text(text: str) -> float:
     """A float from text; it may be infinite. Raises ValueError."""
+    if len(text) > LONGEST_NUMBER:
+        raise ValueError(f"expected a number of at most {LONGEST_NUMBER} characters, got {len(text)}")
     if match := _PI.fullmatch(text):
-        # Through float, as int() refuses more than 4300 digits.
-        times, over = float(match["times"] or 1), float(match["over"] or 1)
-        return (-1.0 if match["sign"] == "-" else 1.0) * times * math.pi / over
-    try:
+        times = Fraction(int(match["times"] or 1), int(match["over"] or 1))
+        return multiple_of_pi(-times if match["sign"] == "-" else times)
+    if is_decimal(text):
+        return decimal(text)
+    if _NOT_FINITE.fullmatch(text):
         return float(text)
-    except ValueError:
-        raise ValueError(f"expected a number or a multiple of pi such as 'pi/2' or '3*pi/4', got {shown(text)}") from None
+    raise ValueError(f"expected a number or a multiple of pi such as 'pi/2' or '3*pi/4', got {shown(text)}")
 
 
 def checked_angle(value: float, path: Path, key: str) -> float:

@@ -10,8 +10,6 @@ from harness.cause.explain import explain
 from harness.cause.first_difference import first_difference
 from harness.cause.probe import PARTS, Probe
 from harness.cause.problem import Problem, State
-from harness.certificate.certify import Sampled, certify, sample
-from harness.certificate.interpolation import GRID_LIMIT, Axis
 from harness.description.dh import Convention
 from harness.difference.operands import TIP, Operand, matched
 from harness.difference.result import Difference, Largest
@@ -19,7 +17,7 @@ from harness.kinematics.invariants import match
 from harness.kinematics.mechanism import Mechanism
 from harness.kinematics.recipes import Recipe
 from harness.kinematics.side_by_side import canonical_side
-from harness.se3 import Array
+from harness.theorem.statement import Theorem, theorem
 
 SLIDE = 0.5  # m, range of prismatic joints
 
@@ -43,6 +41,8 @@ def diff(a: Operand, b: Operand, tolerance: tuple[float, float]) -> Difference:
     explanation = None if same else explain(problem)
     mechanism = _mechanism(problem.a)
     unexplained = "" if same or explanation else first_difference(problem, mechanism.joints, mechanism.prismatic)
+    proven = _theorem(a, b, names)
+    tip = proven.frames[TIP]
     errors = [max(x) for x in zip(*(start.errors(part) for part in PARTS), strict=True)]
     recipes = (problem.a, problem.b) if first is a else (problem.b, problem.a)
     convention: Convention = next((o.table.convention for o in (a, b) if o.table is not None), "standard")
@@ -57,8 +57,8 @@ def diff(a: Operand, b: Operand, tolerance: tuple[float, float]) -> Difference:
         a=a,
         b=b,
         same=same,
-        largest=Largest(errors[0], errors[1]),
-        bound=_bound(problem),
+        largest=Largest(max(errors[0], tip.position_found), max(errors[1], tip.rotation_found)),
+        theorem=proven,
         tolerance=Largest(*tolerance),
         joints=names,
         explanation=explanation,
@@ -97,23 +97,7 @@ def _problem(a: Operand, b: Operand, names: dict[str, str], tolerance: tuple[flo
     )
 
 
-def _bound(problem: Problem) -> Largest | None:
-    """Proven for every angle (prismatic joints within half a metre); None for long chains and where joints are coupled."""
-    mechanism = _mechanism(problem.a)
-    axes = [Axis(False, 1, -SLIDE, SLIDE) if slides else Axis(True, 1, 0.0, 2.0 * math.pi) for slides in mechanism.prismatic]
-    if math.prod(axis.count for axis in axes) > GRID_LIMIT:
-        return None
-    sampled = []
-    for recipe in (problem.a, problem.b):
-        sampled.append(_sampled(_mechanism(recipe), axes))
-    if not all(s.holds for s in sampled):
-        return None
-    bounds = certify(sampled[0], sampled[1], axes)
-    return Largest(float(bounds.position[0]), float(bounds.rotation[0]))
-
-
-def _sampled(mechanism: Mechanism, axes: list[Axis]) -> Sampled:
-    def evaluate(q: Array) -> Array:
-        return np.ascontiguousarray(np.swapaxes(mechanism.placements(q, (TIP,))[:, :, :3, :], -1, -2))
-
-    return sample(evaluate, axes, np.random.default_rng(0))
+def _theorem(a: Operand, b: Operand, names: dict[str, str]) -> Theorem:
+    """What is proven for every angle, and for prismatic joints within half a metre either way."""
+    ranges = {joint: (-SLIDE, SLIDE) for joint, slides in zip(a.joints, a.prismatic, strict=True) if slides}
+    return theorem(a.chains(a.joints, {j: j for j in a.joints}), b.chains(a.joints, names), ranges)

@@ -13,6 +13,8 @@ from harness.description.urdf import MOVABLE, UNSUPPORTED, Urdf
 from harness.description.urdf_lint import check
 from harness.errors import InputError, UrdfError
 from harness.kinematics.recipes import Recipe, TableRecipe, UrdfRecipe
+from harness.theorem import descriptions as exact
+from harness.theorem.chain import Chains
 
 TIP = "tip"
 
@@ -54,6 +56,19 @@ class Operand:
             prismatic=slides,
             gauge=gauge,
         )
+
+    def chains(self, order: Sequence[str], names: Mapping[str, str]) -> Chains:
+        """Its chain with exact numbers, in the joints `order`; names: its own joint for each of them. Ends at `TIP`."""
+        if self.table is not None:
+            ends = (exact.of_matrix(self.table.base), exact.of_matrix(self.table.tool))
+            chains = exact.of_table(self.table, {TIP: ("tool", ())}, *ends)
+            return chains.asked(tuple(order), [self.table.joints.index(names[joint]) for joint in order])
+        if self.urdf is None:
+            raise ValueError("neither a table nor a URDF")
+        units = np.eye(len(order))
+        rows = {names[joint]: (units[i], 0.0) for i, joint in enumerate(order)}
+        joints = complete(rows, self.urdf, len(order))
+        return exact.of_urdf(self.urdf, self.base, {TIP: (self.tip, ())}, joints, order)
 
 
 def of_table(table: DHTable, name: str) -> Operand:

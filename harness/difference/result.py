@@ -17,6 +17,7 @@ from harness.kinematics.invariants import Matching
 from harness.kinematics.side_by_side import COLUMNS, Side, Unit, difference_of, with_matching_normals
 from harness.report.notebook import html_lines, html_table, text_table
 from harness.report.text import metres, plain, radians
+from harness.theorem.statement import Theorem
 
 CHANGED = 1e-9  # m, rad: below, two numbers of a table are the same
 MOST_EQUIVALENTS = 4
@@ -50,7 +51,7 @@ class Difference:
     a, b: the operands.
     same: whether they agree within `tolerance` at every configuration tried.
     largest: largest discrepancy seen.
-    bound: largest discrepancy at any configuration, as proven; None if it was not.
+    theorem: what is proven of the two, for every angle, and half a metre of each slide either way.
     tolerance: what counts as agreement [m], [rad].
     joints: b's joint for each of a's.
     explanation: the repair that makes both agree; None if they do, or none was found.
@@ -64,7 +65,7 @@ class Difference:
     b: Operand
     same: bool
     largest: Largest
-    bound: Largest | None
+    theorem: Theorem
     tolerance: Largest
     joints: dict[str, str]
     explanation: Explanation | None
@@ -72,6 +73,11 @@ class Difference:
     convention: Convention
     tables: tuple[Side, Side]
     matching: Matching | None
+
+    @property
+    def bound(self) -> Largest:
+        """No configuration has a larger discrepancy: position [m] and rotation [rad]. Proven."""
+        return Largest(self.theorem.position, self.theorem.rotation)
 
     @property
     def causes(self) -> tuple[Change, ...]:
@@ -107,9 +113,11 @@ class Difference:
     def headline(self) -> Line:
         """The verdict and how far apart the two are."""
         word, kind = ("SAME", "same") if self.same else ("DIFFERENT", "different")
+        if self.theorem.is_equal:
+            return Line(plain(f"{word} {self.a.label} and {self.b.label}: equal at every configuration (proven)"), kind)
         seen = f"up to {metres(self.largest.position)}, {radians(self.largest.rotation)} apart"
-        proven = f"; for all q at most {metres(self.bound.position)}, {radians(self.bound.rotation)}" if self.bound else ""
-        return Line(plain(f"{word} {self.a.label} and {self.b.label}: {seen}{proven}"), kind)
+        proven = f"for all q at most {metres(self.bound.position)}, {radians(self.bound.rotation)} (proven)"
+        return Line(plain(f"{word} {self.a.label} and {self.b.label}: {seen}; {proven}"), kind)
 
     def reasons(self) -> Iterator[Line]:
         """Why they differ, one change a line, each with what does the same in its place."""

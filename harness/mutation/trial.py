@@ -51,7 +51,13 @@ def try_out(
     workers.model = mutant.model
     commands = ((named[0], (str(mutant.fault),)),) if mutant.fault else ()
     options = Options(
-        samples=SAMPLES, seed=0, sources=named, workers=commands, certify=bool(original.file.accepted), in_process=True
+        samples=SAMPLES,
+        seed=0,
+        sources=named,
+        workers=commands,
+        certify=bool(original.file.accepted),
+        probe=False,  # the engines are those of every other trial
+        in_process=True,
     )
     try:
         report = crosscheck(mutant.model, options, None, workers)

@@ -18,8 +18,10 @@ from harness.rendering.markdown import render_markdown
 from harness.report.document import PairResult, Report, Source
 from harness.report.explanation import Explanation
 from harness.report.model_parts import Link, ParameterPair
-from harness.report.sentences import change_of, changed_text, difference, for_all, moved_text
+from harness.report.proven import for_all, proven_text
+from harness.report.sentences import change_of, changed_text, difference, moved_text
 from harness.report.source_parts import FrameResult
+from harness.report.tested import further_out, own_description
 from harness.report.text import degrees, metres, numbers, pasteable, plain, point, quantity, radians
 from harness.report.verdicts import Verdict
 
@@ -48,7 +50,7 @@ def _environment() -> Environment:
     env.filters.update(
         metres=metres, radians=radians, numbers=numbers, colour=colour, for_all=for_all, quantity=quantity, difference=difference,
         change_of=change_of, moved=moved_text, changed=changed_text, apart=apart, point=point,
-        degrees=degrees, pasteable=pasteable,
+        degrees=degrees, pasteable=pasteable, own_description=own_description, further_out=further_out,
     )  # fmt: skip
     return env
 
@@ -70,10 +72,11 @@ def render_html(report: Report) -> str:
         failing=failing(report),
         causes=_causes(report),
         misfiled=[p for p in report.published if p.found == "wrong" and p.status == "holds"],
-        proven_within=sum(_proven_within(s) for s in report.sources),
+        proven=proven_text(report.theorem, [b.frame for b in report.theorem.frames]) if report.theorem else "",
         blind={frame.name for frame in report.frames if frame.relation == "rigid"},
         side_by_side=_side_by_side(report),
         certified=[s for s in report.sources if s.certificate],
+        tested=[s for s in report.sources if s.tested],
         explained=[s for s in report.sources if s.explanation],
         absent=[s for s in report.sources if s.status != "ran"],
         posed=posed(report),
@@ -154,12 +157,6 @@ def _matrix(report: Report) -> list[tuple[Source, list[Cell | None]]]:
     ran = [s for s in report.sources if s.status == "ran"]
     pairs = {frozenset((cell.pair.a, cell.pair.b)): cell for cell in _numbered(report)}
     return [(a, [pairs.get(frozenset((a.name, b.name))) for b in ran]) for a in ran]
-
-
-def _proven_within(source: Source) -> bool:
-    """Whether the bounds over all configurations are within tolerance at every frame."""
-    bounds, limits = source.certificate.frames if source.certificate else [], source.tolerance
-    return bool(bounds) and all(b.position_upper <= limits.position and b.rotation_upper <= limits.rotation for b in bounds)
 
 
 def _causes(report: Report) -> list[tuple[str, Explanation, list[Source]]]:

@@ -8,6 +8,7 @@ from harness.report.document import PublishedResult, Report, Source
 from harness.report.regression import Regression
 from harness.report.sentences import why, worsened
 from harness.report.source_parts import FrameResult
+from harness.report.tested_parts import Tested
 from harness.report.text import metres, numbers, pasteable, plain, radians
 from harness.report.verdicts import Verdict
 
@@ -16,7 +17,7 @@ def render_junit(report: Report) -> str:
     """The report as JUnit XML text."""
     suite = TestSuite(plain(report.robot.name))
     for source in report.sources:
-        if source.reference:
+        if source.reference and source.passes:
             continue
         if source.status != "ran":
             suite.add_testcase(_not_run(report, source))
@@ -24,6 +25,8 @@ def render_junit(report: Report) -> str:
             suite.add_testcase(_frame(report, source, frame))
         if source.verdict in (Verdict.INVALID_PLACEMENTS, Verdict.KEEPS_STATE):
             suite.add_testcase(_invalid(report, source))
+        elif source.tested and source.tested.problem:
+            suite.add_testcase(_own_description(report, source, source.tested))
     for claim in report.published:
         suite.add_testcase(_published(report, claim))
     if report.regression is not None and report.regression.strict:
@@ -69,7 +72,19 @@ def _invalid(report: Report, source: Source) -> TestCase:
     if source.validity:
         v = source.validity
         again = f"; asked again, one changed by {v.again:.2g}"
-        case.result = [Failure(f"{v.invalid} of {v.checked} are no rigid transforms{again}")]
+        problem = f"; {source.tested.problem}" if source.tested and source.tested.problem else ""
+        case.result = [Failure(plain(f"{v.invalid} of {v.checked} are no rigid transforms{again}{problem}"))]
+    return case
+
+
+def _own_description(report: Report, source: Source, tested: Tested) -> TestCase:
+    """A source that was seen to compute something else than its description says."""
+    case = _case(report, "computes what its description says", source.name)
+    failure = Failure(plain(tested.problem))
+    lines = [f"{tested.configurations} configurations in {tested.calls} calls"]
+    lines += [f"at q = {numbers(tested.caught.q, 17)}"] if tested.caught else []
+    failure.text = "\n".join(plain(line) for line in [*lines, pasteable(report.settings.command)])
+    case.result = [failure]
     return case
 
 

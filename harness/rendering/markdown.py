@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 
 from harness.report.document import Report, Source
-from harness.report.sentences import changed_text, difference, for_all, moved_text, why
+from harness.report.proven import for_all
+from harness.report.sentences import changed_text, difference, moved_text, why
+from harness.report.tested import all_tested, further_out
 from harness.report.text import metres, numbers, pasteable, plain, radians
 from harness.report.verdicts import Verdict
 
@@ -26,12 +28,13 @@ def render_markdown(report: Report) -> str:
         f"{_md(report.robot.description)}. Reference {_code(report.settings.reference)}; {report.settings.fixed} fixed and "
         f"{report.settings.samples} random configurations, seed {report.settings.seed}.",
         "",
-        "| source | verdict | worst frame | position | rotation | for all q | tolerance | magnitude |",
+        "| source | verdict | worst frame | position | rotation | files, every q | tolerance | magnitude |",
         "|---|---|---|---|---|---|---|---|",
         *(_row(source) for source in ranked[:SOURCES]),
         *([f"| and {len(ranked) - SOURCES} more in the HTML report | | | | | | | |"] if len(ranked) > SOURCES else []),
         "",
         *_limited(_disagreements(report), CAUSES),
+        *_limited(_tested(report), OTHERS),
         *_limited(_parameters(report), OTHERS),
         *_limited(_published(report), OTHERS),
         *_limited(_since(report), OTHERS),
@@ -67,6 +70,14 @@ def _disagreements(report: Report) -> list[str]:
     accepted = {f.accepted.reason: f for s in report.sources for f in s.frames if f.verdict is Verdict.ACCEPTED and f.accepted}
     lines += [f"- accepted: {_md(reason)} ({metres(f.position.max)})" for reason, f in accepted.items()]
     return lines
+
+
+def _tested(report: Report) -> list[str]:
+    """Each engine against its own description, as far as there is something to say; what passes and what is odd."""
+    lines = [f"- {_code(s.name)} {_md(text)}" for s in report.sources for text in further_out(s)]
+    lines = [f"- {_code(s.name)}: {_md(s.tested.problem)}" for s in report.sources if s.tested and s.tested.problem] + lines
+    text = all_tested(report.sources)
+    return [f"- {_md(text)}", *lines] if text else lines
 
 
 def _parameters(report: Report) -> list[str]:

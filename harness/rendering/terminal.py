@@ -7,7 +7,9 @@ from rich.text import Text
 
 from harness.rendering.tables import bare_table
 from harness.report.document import Report, Source
-from harness.report.sentences import changed_text, for_all, moved_text, why
+from harness.report.proven import for_all
+from harness.report.sentences import changed_text, moved_text, why
+from harness.report.tested import all_tested, further_out
 from harness.report.text import metres, numbers, plain, radians
 from harness.report.verdicts import Verdict
 
@@ -22,7 +24,7 @@ def show(report: Report, console: Console) -> None:
     console.print(
         Text(report.verdict.word, style=_STYLE[report.verdict.exit_code]), Text(plain(report.verdict.sentence)), soft_wrap=True
     )
-    table = bare_table("source", "verdict", "worst frame", "position", "rotation", "for all q", "tolerance", "magnitude")
+    table = bare_table("source", "verdict", "worst frame", "position", "rotation", "files, every q", "tolerance", "magnitude")
     for source in report.sources:
         if not source.reference:
             table.add_row(*_row(source))
@@ -30,6 +32,7 @@ def show(report: Report, console: Console) -> None:
     _causes(report, console)
     for source in report.sources:
         _located(source, report.settings.reference, console)
+    _tested(report, console)
     for reason in report.verdict.reasons[1:MAX_REASONS]:
         console.print(Text(f"  also: {plain(reason)}"), soft_wrap=True)
     if (more := len(report.verdict.reasons) - MAX_REASONS) > 0:
@@ -68,6 +71,15 @@ def _since(report: Report, console: Console) -> None:
         console.print(Text(text, style="red" if change.worse else ""), soft_wrap=True)
     if (more := max(0, len(g.moved) - MAX_MOVED) + max(0, len(g.changed) - MAX_MOVED)) > 0:
         console.print(Text(f"  and {more} more changes in the report"))
+
+
+def _tested(report: Report, console: Console) -> None:
+    """Each engine against its own description: one line for all that compute what it says, and one a source for what else is."""
+    if text := all_tested(report.sources):
+        console.print(Text(plain(f"  {text}")))
+    for source in report.sources:
+        for text in further_out(source):
+            console.print(Text(plain(f"  {source.name}: {text}")), soft_wrap=True)
 
 
 def _row(source: Source) -> tuple[Text, ...]:
@@ -118,6 +130,6 @@ def _located(source: Source, reference: str, console: Console) -> None:
         console.print(Text(where), soft_wrap=True)
         console.print(Text(f"    {reference} has it at {p_a}, {source.name} at {p_b}"), soft_wrap=True)
     if source.certificate and source.certificate.status == "refused":
-        console.print(Text(f"    no certificate: {plain(source.certificate.reason)}"), soft_wrap=True)
+        console.print(Text(f"    nothing proven counts for it: {plain(source.certificate.reason)}"), soft_wrap=True)
     for text in source.explained_by:
         console.print(Text(f"    known: {plain(text)}"), soft_wrap=True)

@@ -30,8 +30,10 @@ from harness.report.parts import (
     Vector,
 )
 from harness.report.pose import Pose
+from harness.report.proof_parts import Certificate, Theorem
 from harness.report.regression import Regression
-from harness.report.source_parts import Certificate, FrameResult, Reproducer, Tolerance, TraitNote, Validity
+from harness.report.source_parts import FrameResult, Reproducer, Tolerance, TraitNote, Validity
+from harness.report.tested_parts import Tested
 from harness.report.text import metres, plain, radians
 from harness.report.verdicts import SourceVerdict
 
@@ -77,6 +79,7 @@ class Source(Part):
     reproducer: Reproducer | None = None
     pose: Pose | None = None
     certificate: Certificate | None = None
+    tested: Tested | None = None
 
     @model_validator(mode="after")
     def _has_its_worst_frame(self) -> Source:
@@ -94,6 +97,7 @@ class Source(Part):
         yield from (f.frame for f in self.frames)
         yield from (f.frame for f in self.pose.frames) if self.pose else ()
         yield from (f.frame for f in self.certificate.frames) if self.certificate else ()
+        yield from (spot.frame for spot in self.tested.spots) if self.tested else ()
 
     def configurations(self) -> Iterator[Configuration]:
         """Every configuration it speaks of."""
@@ -102,6 +106,7 @@ class Source(Part):
         at += [self.validity.first, self.validity.again_at] if self.validity else []
         yield from (place.q for place in at if place)
         yield from (self.reproducer.q,) if self.reproducer else ()
+        yield from (spot.q for spot in self.tested.spots) if self.tested else ()
 
     def cells(self) -> list[str]:
         """Name, verdict, worst frame and the largest discrepancies there; the reason, if nothing was compared."""
@@ -192,7 +197,7 @@ class Robot(Part):
 class Settings(Part):
     """What was asked for. `not_chosen`: sources of model.toml that the command line left out. `gate`: what decides, the
     configurations sampled or the certificate. `fixed` and `samples` count configurations, `subset` those on which all pairs
-    are compared."""
+    are compared. `probe_seed`: of the configurations at which each engine was tested against its own description."""
 
     reference: str
     sources: list[str]
@@ -202,6 +207,7 @@ class Settings(Part):
     fixed: Count
     samples: Count
     seed: int = Field(ge=0, lt=2**64)
+    probe_seed: int = Field(default=0, ge=0, lt=2**64)
     subset: Count
     command: str
 
@@ -245,7 +251,7 @@ class Report(Part):
     """The whole document."""
 
     format: Literal["fk-crosscheck report"] = "fk-crosscheck report"
-    version: Literal["1.3"] = "1.3"
+    version: Literal["1.4"] = "1.4"
     robot: Robot
     settings: Settings
     verdict: GateVerdict
@@ -256,6 +262,7 @@ class Report(Part):
     parameters: SideBySide | None = None
     pairs: list[PairResult]
     published: list[PublishedResult]
+    theorem: Theorem | None = None
     lint: list[Lint]
     regression: Regression | None = None
     environment: Environment
@@ -266,6 +273,8 @@ class Report(Part):
         sources, frames = {s.name for s in self.sources}, {f.name for f in self.frames}
         _require((name for pair in self.pairs for name in (pair.a, pair.b)), sources, "source")
         _require((place for source in self.sources for place in source.places()), frames, "frame")
+        if self.theorem is not None:
+            self.theorem.require(frames, len(self.robot.joints))
         if any(len(q) != len(self.robot.joints) for source in self.sources for q in source.configurations()):
             raise ValueError(f"expected {len(self.robot.joints)} joint values in each configuration")
         return self

@@ -59,12 +59,3 @@ def why(source: Source) -> list[str]:
     before = f"{metres(explanation.before_position)}, {radians(explanation.before_rotation)}"
     lines.append(f"  tried: {before} before, {metres(explanation.after_position)}, {radians(explanation.after_rotation)} after")
     return lines
-
-
-def for_all(source: Source) -> str:
-    """The bound over every configuration at the frame where it is largest: `<= 1.6e-11 m`, or `refused`."""
-    if source.certificate is None:
-        return ""
-    if source.certificate.status == "refused":
-        return "refused"
-    return f"<= {metres(max(bound.position_upper for bound in source.certificate.frames))}"

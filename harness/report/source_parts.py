@@ -5,7 +5,7 @@ Units are metres and radians.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -17,7 +17,6 @@ from harness.report.parts import (
     FineMatrix,
     NonNegative,
     Part,
-    UpperBound,
     anchor,
 )
 from harness.report.verdicts import FrameVerdict
@@ -121,37 +120,3 @@ class Validity(Part):
     first_frame: str = ""
     again: Discrepancy = 0.0
     again_at: At | None = None
-
-
-class FrameBound(Part):
-    """For every configuration: no discrepancy at this frame is above `upper`; `found` is the largest one seen."""
-
-    frame: str
-    position_upper: UpperBound
-    position_found: Discrepancy
-    rotation_upper: UpperBound
-    rotation_found: Discrepancy
-    method: str
-
-
-class Certificate(Part):
-    """Agreement for every angle of every revolute joint, and every prismatic joint within its range; or why there is none.
-
-    form: `grid` or `links`; nodes: configurations evaluated. residual, reference_residual: how far each engine is from the
-    interpolant of its own values at random configurations; limit: how far rounding explains.
-    """
-
-    status: Literal["certified", "refused"]
-    reason: str = ""
-    form: str = ""
-    nodes: Count = 0
-    residual: Discrepancy | None = None
-    reference_residual: Discrepancy | None = None
-    limit: Discrepancy | None = None
-    frames: list[FrameBound] = []
-
-    @model_validator(mode="after")
-    def _certifies_something(self) -> Certificate:
-        if self.status == "certified" and not self.frames:
-            raise ValueError("expected a bound of at least one frame in a certificate")
-        return self

@@ -35,6 +35,8 @@ class Options:
     accepted: folder of the accepted numbers; None: the report does not say what moved since.
     strict: a discrepancy that grew since it was accepted fails.
     resume: a long run keeps a checkpoint where its session says, and continues one that was interrupted.
+    probe: test each engine against its own description, if `certify` is wanted too.
+    probe_seed: seed of the configurations that this takes, below 2^64. It changes nothing that is compared or accepted.
     trust: start the programs that a model's own model.toml names; without it, such a model raises UntrustedError.
 
     Raises InputError for numbers that cannot be.
@@ -55,6 +57,8 @@ class Options:
     accepted: Path | None = None
     strict: bool = False
     resume: bool = True
+    probe: bool = True
+    probe_seed: int = 0
     trust: bool = False
 
     def reproduced_by(self, command: str) -> Options:
@@ -74,6 +78,8 @@ class Options:
             raise InputError(f"expected samples <= {MOST_SAMPLES}, got {shown(self.samples)}")
         if not 0 <= self.seed < 2**64:
             raise InputError(f"expected 0 <= seed < 2^64, got {shown(self.seed)}")
+        if not 0 <= self.probe_seed < 2**64:
+            raise InputError(f"expected 0 <= probe seed < 2^64, got {shown(self.probe_seed)}")
         if not 0 <= self.jobs <= MOST_JOBS:
             raise InputError(f"expected jobs >= 0 and <= {MOST_JOBS}, got {shown(self.jobs)}")
 
@@ -82,12 +88,12 @@ class Options:
             if not isinstance(self.accepted, str | Path):
                 raise InputError(f"expected a folder, got {self.accepted!r}", key="accepted")
             object.__setattr__(self, "accepted", Path(self.accepted))
-        for name in ("samples", "seed", "jobs"):
+        for name in ("samples", "seed", "jobs", "probe_seed"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, Integral):
                 raise InputError(f"expected a whole number, got {value!r}", key=name)
             object.__setattr__(self, name, int(value))
-        for name in ("certify", "explain", "all_engines", "in_process", "strict", "resume", "trust"):
+        for name in ("certify", "explain", "all_engines", "in_process", "strict", "resume", "probe", "trust"):
             if not isinstance(value := getattr(self, name), bool):
                 raise InputError(f"expected True or False, got {value!r}", key=name)
         if not isinstance(self.limits, Limits):

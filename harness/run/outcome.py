@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from harness.cause.explain import Explanation
-from harness.certificate.certify import Bounds
 from harness.comparison.compare import Comparison
 from harness.description.model import RobotModel
 from harness.errors import EngineFailed, EngineUnavailable
@@ -15,7 +14,10 @@ from harness.run.binding import Bound
 from harness.run.options import Options
 from harness.run.plan import Planned, pair_tolerance
 from harness.run.rigid import Offset, transforms
+from harness.run.tested import Tested
 from harness.se3 import Array
+from harness.theorem.prove import FrameBound
+from harness.theorem.statement import Theorem
 
 Status: TypeAlias = Literal["ran", "not run", "failed"]
 
@@ -54,27 +56,15 @@ class Worst:
 
 @dataclass(frozen=True, kw_only=True)
 class Certified:
-    """A source's certificate against the reference, or why it has none (`reason`).
+    """What is proven of the descriptions that a source and the reference read, or why it does not count (`reason`).
 
-    form: `grid` or `links`.
-    nodes: configurations evaluated.
-    residual, reference_residual: how far each engine is from its own interpolant.
-    limit: how far rounding explains.
-    frames: indices of the mapped frames certified.
-    bounds: the proven bounds there.
-    position_found, rotation_found: largest discrepancies seen there, (F,) [m], [rad].
+    frames: indices of the mapped frames.
+    bounds: the proven bounds there; None if nothing counts.
     """
 
     reason: str = ""
-    form: str = ""
-    nodes: int = 0
-    residual: float = 0.0
-    reference_residual: float = 0.0
-    limit: float = 0.0
     frames: Sequence[int] = ()
-    bounds: Bounds | None = None
-    position_found: Array | None = None
-    rotation_found: Array | None = None
+    bounds: tuple[FrameBound, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -93,7 +83,7 @@ class Outcome:
     status: `ran` until it fails.
     reason, install: why it does not run, and the line that installs it.
     bound: its engine; None once it does not run.
-    reproduced, worst, certified, explained: what the phases of the run gave; None where they had nothing to say.
+    reproduced, worst, certified, explained, tested: what the phases of the run gave; None where they had nothing to say.
     """
 
     planned: Planned
@@ -105,6 +95,7 @@ class Outcome:
     worst: Worst | None = None
     certified: Certified | None = None
     explained: Explained | None = None
+    tested: Tested | None = None
 
     @property
     def name(self) -> str:
@@ -122,7 +113,7 @@ class Outcome:
 
         What the source gave before goes with it: a partial result is no result.
         """
-        self.bound = self.reproduced = self.worst = self.certified = self.explained = None
+        self.bound = self.reproduced = self.worst = self.certified = self.explained = self.tested = None
         self.status = "not run" if isinstance(error, EngineUnavailable) else "failed"
         self.reason = error.reason if isinstance(error, EngineUnavailable | EngineFailed) else f"{type(error).__name__}: {error}"
         self.install = (error.install or "") if isinstance(error, EngineUnavailable) else ""
@@ -139,6 +130,7 @@ class Run:
     in_house: the in-house FK, bound to the model.
     offsets: the measured offsets of rigid frames.
     comparison: discrepancies of all sources; None if the reference does not run.
+    theorem: what is proven of the table and the URDF; None if nothing was to be.
     seconds, loaded_in: time of the whole run, and until every engine was there [s].
     """
 
@@ -149,6 +141,7 @@ class Run:
     in_house: Bound
     offsets: dict[str, Offset] = field(default_factory=dict)
     comparison: Comparison | None = None
+    theorem: Theorem | None = None
     seconds: float = 0.0
     loaded_in: float = 0.0
 
@@ -172,6 +165,19 @@ class Run:
     def tolerance(self, outcome: Outcome) -> tuple[float, float]:
         """Tolerance [m], [rad] of a source against the reference."""
         return pair_tolerance(outcome.planned, self.reference.planned)
+
+    def take_out(self, outcome: Outcome, error: Exception, where: str = "") -> None:
+        """Take out a source that failed after it was compared.
+
+        error: what it raised.
+        where: when it did, for the reason.
+        """
+        outcome.fail(error)
+        outcome.reason = f"{outcome.reason} {where}".rstrip()
+        if outcome is self.reference:
+            self.comparison = None
+        elif self.comparison is not None:
+            self.comparison.drop(outcome.name)
 
     def discrepancies(self) -> Comparison:
         """The comparison. Raises RuntimeError if the reference does not run."""

@@ -7,13 +7,14 @@ import time
 
 from harness.description.model import RobotModel
 from harness.errors import EngineFailed
-from harness.run.certifying import certify_all
 from harness.run.checkpoint import Checkpoints
 from harness.run.explaining import explain_all
 from harness.run.loading import load_all
 from harness.run.options import Options
 from harness.run.outcome import Run
 from harness.run.plan import plan
+from harness.run.probing import probe_all
+from harness.run.proving import prove_all
 from harness.run.resuming import AnswersChangedError, resume
 from harness.run.streaming import Progress, compare
 from harness.run.worst import find_worst, reproduce
@@ -73,7 +74,9 @@ def run_robot(
             if options.explain:
                 explain_all(run)
             if options.certify:
-                certify_all(run, workers)
+                prove_all(run)
+            if options.certify and options.probe:
+                probe_all(run, workers)
         _drop_dead(run)
         workers.settle(o.bound.engine for o in run.outcomes if o.bound is not None)
     run.seconds = time.perf_counter() - started
@@ -85,8 +88,4 @@ def _drop_dead(run: Run) -> None:
     for outcome in run.outcomes:
         engine = outcome.bound.engine if outcome.bound else None
         if isinstance(engine, ProcessEngine) and engine.died:
-            outcome.fail(EngineFailed(outcome.name, engine.died))
-            if outcome is run.reference:
-                run.comparison = None
-            elif run.comparison is not None:
-                run.comparison.drop(outcome.name)
+            run.take_out(outcome, EngineFailed(outcome.name, engine.died))

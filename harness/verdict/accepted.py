@@ -22,7 +22,6 @@ from harness.report.regression import Changed, Moved, Quantity, Regression
 FOLDER = "accepted"
 GATE = {0: "passes", 1: "fails", 3: "incomplete"}  # how the file calls the verdict
 Pair = tuple[NonNegative, NonNegative]  # position [m], rotation [rad]
-BOUND = 50.0  # times the noise floor: a bound multiplies rounding by the Lebesgue constant of its grid, about 20 for six joints
 SEEN: tuple[Quantity, Quantity] = ("position", "rotation")
 PROVEN: tuple[Quantity, Quantity] = ("position, for all q", "rotation, for all q")
 UNITS: tuple[Literal["m", "rad"], ...] = ("m", "rad")
@@ -153,11 +152,11 @@ def _claim(p: PublishedResult) -> str:
 
 
 def _numbers(source: Source) -> AcceptedSource:
-    bounds, wide = source.certificate.frames if source.certificate else [], BOUND * source.floor
+    bounds = source.certificate.frames if source.certificate else []
     return AcceptedSource(
         verdict=source.verdict,
         frames={f.frame: (_kept(f.position.max, source.floor), _kept(f.rotation.max, source.floor)) for f in source.frames},
-        bounds={b.frame: (_kept(b.position_upper, wide), _kept(b.rotation_upper, wide)) for b in bounds},
+        bounds={b.frame: (_kept(b.position_upper, source.floor), _kept(b.rotation_upper, source.floor)) for b in bounds},
     )
 
 
@@ -174,7 +173,7 @@ def _moved(numbers: AcceptedNumbers, report: Judged) -> Iterator[Moved]:
         new = _numbers(source)
         for quantities, before, after, floor in (
             (SEEN, known.frames, new.frames, source.floor),
-            (PROVEN, known.bounds, new.bounds, BOUND * source.floor),
+            (PROVEN, known.bounds, new.bounds, source.floor),
         ):
             for frame in (f for f in before if f in after):
                 for what, unit, a, b in zip(quantities, UNITS, before[frame], after[frame], strict=True):

@@ -11,8 +11,10 @@ from harness.description.configurations import Configuration
 from harness.description.published import Published
 from harness.engines.lint_traits import messages
 from harness.report import document as doc
+from harness.report.proof_parts import Theorem
 from harness.run.outcome import Run
 from harness.verdict.accepted import AcceptedNumbers, since
+from harness.verdict.evidence import theorem
 from harness.verdict.gate import gate, held_to
 from harness.verdict.judge import check_claim
 from harness.verdict.model_part import side_by_side, trees
@@ -28,6 +30,7 @@ class _Judged:
     settings: doc.Settings
     sources: list[doc.Source]
     published: list[doc.PublishedResult]
+    theorem: Theorem | None
     verdict: doc.GateVerdict
 
 
@@ -46,6 +49,7 @@ def assemble(run: Run, accepted: AcceptedNumbers | None = None) -> doc.Report:
         parameters=side_by_side(run),
         pairs=_pairs(run),
         published=judged.published,
+        theorem=judged.theorem,
         lint=_lint(run),
         regression=regression,
         environment=_environment(run),
@@ -60,8 +64,9 @@ def _judged(run: Run) -> _Judged:
         for claim in configuration.published
     ]
     settings = _settings(run)
-    verdict = gate(run.model.name, sources, published, settings)
-    return _Judged(robot=_robot(run), settings=settings, sources=sources, published=published, verdict=verdict)
+    proven = theorem(run)
+    verdict = gate(run.model.name, sources, published, settings, proven)
+    return _Judged(robot=_robot(run), settings=settings, sources=sources, published=published, theorem=proven, verdict=verdict)
 
 
 def _robot(run: Run) -> doc.Robot:
@@ -93,6 +98,7 @@ def _settings(run: Run) -> doc.Settings:
         fixed=fixed,
         samples=options.samples,
         seed=options.seed,
+        probe_seed=options.probe_seed,
         subset=run.comparison.subset if run.comparison else 0,
         command=options.command,
     )

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from harness.cause.changes import Change
 from harness.description.configurations import ConfigurationSet
 from harness.report import explanation as reasons
+from harness.report import proof_parts as proofs
 from harness.report import source_parts as parts
 from harness.report.pose import FramePair, Pose
 from harness.run.outcome import Explained, Outcome, Run
+from harness.theorem.prove import FrameBound
 
 
 def at(configurations: ConfigurationSet, index: int, seed: int) -> parts.At:
@@ -18,39 +19,38 @@ def at(configurations: ConfigurationSet, index: int, seed: int) -> parts.At:
     return parts.At(index=index, label=configurations.label(index), q=configurations.one(seed, index).tolist())
 
 
-def certificate(run: Run, outcome: Outcome) -> parts.Certificate | None:
-    """The report entry of a source's certificate."""
+def certificate(run: Run, outcome: Outcome) -> proofs.Certificate | None:
+    """The report entry of what is proven of the descriptions that a source and the reference read."""
     certified = outcome.certified
     if certified is None:
         return None
-    bounds, position, rotation = certified.bounds, certified.position_found, certified.rotation_found
-    frames = []
-    if bounds is not None and position is not None and rotation is not None:
-        frames = [
-            parts.FrameBound(
-                frame=run.model.frames.frames[index].name,
-                position_upper=float(bounds.position[i]),
-                position_found=float(position[i]),
-                rotation_upper=float(bounds.rotation[i]),
-                rotation_found=float(rotation[i]),
-                method=bounds.method[i],
-            )
-            for i, index in enumerate(certified.frames)
-        ]
-    return parts.Certificate(
-        status="certified" if frames else "refused",
-        reason=certified.reason,
-        form=certified.form,
-        nodes=certified.nodes,
-        residual=_finite(certified.residual),
-        reference_residual=_finite(certified.reference_residual),
-        limit=_finite(certified.limit),
-        frames=frames,
+    pairs = zip(certified.frames, certified.bounds, strict=True) if certified.bounds else ()
+    frames = [_bound(run.model.frames.frames[index].name, bound) for index, bound in pairs]
+    return proofs.Certificate(status="certified" if frames else "refused", reason=certified.reason, frames=frames)
+
+
+def theorem(run: Run) -> proofs.Theorem | None:
+    """The report entry of what is proven of the two descriptions."""
+    if run.theorem is None:
+        return None
+    return proofs.Theorem(
+        frames=[_bound(name, bound) for name, bound in run.theorem.frames.items()],
+        equality=dict(run.theorem.equality),
+        worst={name: bound.worst[0].tolist() for name, bound in run.theorem.frames.items()},
+        slides={joint: proofs.Range(lower=lower, upper=upper) for joint, (lower, upper) in run.theorem.ranges.items()},
     )
 
 
-def _finite(x: float) -> float | None:
-    return x if math.isfinite(x) else None
+def _bound(frame: str, bound: FrameBound) -> proofs.FrameBound:
+    return proofs.FrameBound(
+        frame=frame,
+        position_upper=bound.position,
+        position_found=bound.position_found,
+        rotation_upper=bound.rotation,
+        rotation_found=bound.rotation_found,
+        slope=bound.slope,
+        method=bound.method,
+    )
 
 
 def _change(change: Change) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from harness.cause.changes import Change
 from harness.comparison.compare import Comparison
 from harness.comparison.statistics import Stream
 from harness.description.frames import MappedFrame
+from harness.report import proof_parts as proofs
 from harness.report import source_parts as parts
 from harness.report.verdicts import FrameVerdict, Verdict
 from harness.run.outcome import Outcome, Run
@@ -30,11 +31,11 @@ class _Seen:
     frame: MappedFrame
     position: parts.Statistics
     rotation: parts.Statistics
-    proven: parts.FrameBound | None
+    proven: proofs.FrameBound | None
     accepted: tuple[Deviation, str] | None = None
 
 
-def frame_results(run: Run, outcome: Outcome, proven: parts.Certificate | None) -> list[parts.FrameResult]:
+def frame_results(run: Run, outcome: Outcome, proven: proofs.Certificate | None) -> list[parts.FrameResult]:
     """One source at every mapped frame that both it and the reference should have."""
     ends = (outcome.running(), run.reference.running())
     indices = [i for i in range(len(run.model.frames.frames)) if all(end.should_have(i) for end in ends)]
@@ -44,7 +45,7 @@ def frame_results(run: Run, outcome: Outcome, proven: parts.Certificate | None) 
     return [_result(one, verdict, comparison) for one, verdict in zip(seen, verdicts, strict=True)]
 
 
-def _seen(run: Run, outcome: Outcome, index: int, proven: parts.Certificate | None) -> _Seen:
+def _seen(run: Run, outcome: Outcome, index: int, proven: proofs.Certificate | None) -> _Seen:
     comparison, frame = run.discrepancies(), run.model.frames.frames[index]
     return _Seen(
         frame=frame,

@@ -6,10 +6,13 @@ from collections.abc import Iterable, Sequence
 
 from harness.errors import ExitCode
 from harness.report import document as doc
+from harness.report.proof_parts import Theorem
+from harness.report.proven import proven_text
 from harness.report.regression import Regression
 from harness.report.sentences import worsened
 from harness.report.text import metres, radians
 from harness.report.verdicts import Verdict
+from harness.se3 import REPEATED
 
 # What hides what, if several apply. A disagreement found stays found. After a fault of the harness nothing else is sure.
 _ORDER = (ExitCode.DISAGREES, ExitCode.INTERNAL, ExitCode.WRONG_INPUT, ExitCode.NOT_VERIFIED)
@@ -23,7 +26,11 @@ def combined(codes: Iterable[int]) -> int:
 
 
 def gate(
-    robot: str, sources: Sequence[doc.Source], published: Sequence[doc.PublishedResult], settings: doc.Settings
+    robot: str,
+    sources: Sequence[doc.Source],
+    published: Sequence[doc.PublishedResult],
+    settings: doc.Settings,
+    theorem: Theorem | None,
 ) -> doc.GateVerdict:
     """The verdict on a robot. A missing required source never hides a disagreement."""
     wrong, missing = [], []
@@ -49,7 +56,7 @@ def gate(
     sentence = f"{robot} AGREES: {count} within tolerance of the reference at {settings.fixed + settings.samples} configurations"
     if accepted:
         sentence += f", {accepted} deviations as accepted"
-    sentence += _for_all(compared)
+    sentence += _proven(compared, theorem)
     sentence += _asides(sources, settings)
     return doc.GateVerdict(exit_code=0, sentence=sentence)
 
@@ -77,19 +84,13 @@ def _asides(sources: Sequence[doc.Source], settings: doc.Settings) -> str:
     return f"{text}; not chosen: {', '.join(settings.not_chosen)}" if settings.not_chosen else text
 
 
-def _for_all(compared: list[doc.Source]) -> str:
-    """What is proven for every configuration, if it is for every source; accepted deviations speak for themselves."""
-    frames = [
-        (bound.position_upper, bound.rotation_upper)
-        for s in compared
-        if s.certificate
-        for bound in s.certificate.frames
-        if next(f for f in s.frames if f.frame == bound.frame).verdict is Verdict.AGREES
-    ]
-    if not frames or not all(s.certificate and s.certificate.status == "certified" for s in compared):
+def _proven(compared: list[doc.Source], theorem: Theorem | None) -> str:
+    """What is proven of the two descriptions; accepted deviations speak for themselves."""
+    if theorem is None:
         return ""
-    aside = " (accepted deviations aside)" if any(f.verdict is Verdict.ACCEPTED for s in compared for f in s.frames) else ""
-    return f"; for all configurations at most {metres(max(p for p, _ in frames))}, {radians(max(r for _, r in frames))}{aside}"
+    aside = {f.frame for s in compared for f in s.frames if f.verdict is Verdict.ACCEPTED}
+    text = proven_text(theorem, [bound.frame for bound in theorem.frames if bound.frame not in aside])
+    return f"; {text}{' (accepted deviations aside)' if aside else ''}" if text else ""
 
 
 def _misfiled(claims: list[doc.PublishedResult]) -> str:
@@ -102,8 +103,19 @@ def _misfiled(claims: list[doc.PublishedResult]) -> str:
     )
 
 
+def _by_test(source: doc.Source) -> str:
+    """What was seen only where the source was tested against its own description; empty if the comparison shows it too."""
+    compared = {
+        Verdict.INVALID_PLACEMENTS: source.validity is not None and source.validity.first is not None,
+        Verdict.KEEPS_STATE: source.validity is not None and source.validity.again > REPEATED,
+    }.get(source.verdict, any(not f.passes for f in source.frames))
+    return "" if source.tested is None or compared else source.tested.problem
+
+
 def describe(source: doc.Source) -> str:
     """Where and by how much a source is off, in one clause."""
+    if by_test := _by_test(source):
+        return by_test
     if source.verdict is Verdict.INVALID_PLACEMENTS and source.validity is not None and source.validity.first is not None:
         v = source.validity
         return (
@@ -121,7 +133,8 @@ def describe(source: doc.Source) -> str:
         why = source.certificate.reason if source.certificate else "no certificate was made"
         bound = next((b for b in source.certificate.frames if b.frame == worst.frame), None) if source.certificate else None
         if bound is not None:
-            why = f"only {metres(bound.position_upper)}, {radians(bound.rotation_upper)} can be proven for all configurations"
+            apart = f"{metres(bound.position_upper)}, {radians(bound.rotation_upper)}"
+            why = f"of the table and the URDF no less than {apart} can be proven for every configuration"
         return f"{worst.frame} is within tolerance where it was sampled, but {why}"
     if worst.verdict is Verdict.NOT_COMPARED:
         return f"frame {worst.frame} was not compared: the engine does not have it or returned nothing finite"

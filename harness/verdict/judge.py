@@ -13,6 +13,8 @@ from harness.description.published import Published
 from harness.report.verdicts import FrameVerdict, SourceVerdict, Verdict
 from harness.se3 import Array
 
+OwnVerdict = Literal[Verdict.INVALID_PLACEMENTS, Verdict.KEEPS_STATE, Verdict.DISAGREES]
+
 
 @dataclass(frozen=True)
 class Deviation:
@@ -43,11 +45,18 @@ def judge(position: float, rotation: float, tolerance: tuple[float, float], devi
     return Verdict.ACCEPTED
 
 
-def judge_source(frames: Sequence[FrameVerdict], validity: Validity) -> SourceVerdict:
-    """Verdict on one source, from those at its frames and from whether its answers are placements that depend on q alone."""
-    if unfit := judge_validity(validity):
-        return unfit
-    if any(verdict.disagrees for verdict in frames):
+def judge_source(frames: Sequence[FrameVerdict], validity: Validity, own: OwnVerdict | None = None) -> SourceVerdict:
+    """Verdict on one source.
+
+    frames: those at its frames.
+    validity: whether its answers are placements that depend on q alone.
+    own: what speaks against it where it was tested against its own description.
+    """
+    unfit = judge_validity(validity)
+    for verdict in (Verdict.INVALID_PLACEMENTS, Verdict.KEEPS_STATE):
+        if verdict in (unfit, own):
+            return verdict
+    if own is Verdict.DISAGREES or any(verdict.disagrees for verdict in frames):
         return Verdict.DISAGREES
     return Verdict.AGREES_AS_ACCEPTED if Verdict.ACCEPTED in frames else Verdict.AGREES
 

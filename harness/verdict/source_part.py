@@ -10,16 +10,19 @@ from harness.engines.base import Refusal, Trait
 from harness.engines.registry import adapter_of
 from harness.errors import CrosscheckError, EngineUnavailable, InputError
 from harness.report import document as doc
+from harness.report import proof_parts as proofs
 from harness.report import source_parts as parts
 from harness.report.explanation import Explanation
 from harness.report.pose import Pose
+from harness.report.tested_parts import Tested
 from harness.report.verdicts import SourceVerdict, Verdict
 from harness.run.binding import Bound
 from harness.run.outcome import Outcome, Run, Status
 from harness.verdict.evidence import at, certificate, explanation, pose, reproducer
 from harness.verdict.frame_part import frame_results
-from harness.verdict.judge import judge_source, judge_validity
+from harness.verdict.judge import judge_source
 from harness.verdict.noise import CLASSES, NoiseClass, classify
+from harness.verdict.tested_part import judge_tested, tested_part
 
 FLOAT64 = CLASSES[0]
 
@@ -40,7 +43,8 @@ class _Result(TypedDict, total=False):
     explanation: Explanation | None
     reproducer: parts.Reproducer | None
     pose: Pose | None
-    certificate: parts.Certificate | None
+    certificate: proofs.Certificate | None
+    tested: Tested | None
 
 
 class _Given(TypedDict, total=False):
@@ -91,8 +95,14 @@ def _result(run: Run, outcome: Outcome, traits: list[parts.TraitNote]) -> _Resul
         return {"status": "not run", "reason": "not compared: the reference did not run"}
     validity = _validity(run, outcome, outcome.bound)
     if outcome is run.reference:
-        unfit = judge_validity(run.comparison.validity[outcome.name])
-        return {"validity": validity, "verdict": unfit or Verdict.REFERENCE}
+        own = judge_tested(run, outcome, {}, _misreads(outcome.name, traits))
+        judged = judge_source([], run.comparison.validity[outcome.name], own)
+        verdict = Verdict.REFERENCE if judged is Verdict.AGREES else judged
+        return {
+            "validity": validity,
+            "verdict": verdict,
+            "tested": tested_part(run, outcome, {}, _misreads(outcome.name, traits)),
+        }
     return {"validity": validity, **_compared(run, outcome, traits)}
 
 
@@ -106,9 +116,11 @@ def _compared(run: Run, outcome: Outcome, traits: list[parts.TraitNote]) -> _Res
         return {"status": "failed", "verdict": Verdict.FAILED, "reason": reason}
     failing = [f for f in frames if f.verdict.disagrees]
     worst = max(frames, key=lambda f: max(f.position.max / tolerance[0], f.rotation.max / tolerance[1]))
+    by_name, misreads = {f.frame: f.verdict for f in frames}, _misreads(outcome.name, traits)
+    own = judge_tested(run, outcome, by_name, misreads)
     noise = classify(max(f.position.max for f in frames), max(f.rotation.max for f in frames), comparison.reach)
     return {
-        "verdict": judge_source([f.verdict for f in frames], comparison.validity[outcome.name]),
+        "verdict": judge_source([f.verdict for f in frames], comparison.validity[outcome.name], own),
         "frames": frames,
         "worst_frame": worst.frame,
         "first_disagreeing_frame": failing[0].frame if failing else "",
@@ -119,6 +131,7 @@ def _compared(run: Run, outcome: Outcome, traits: list[parts.TraitNote]) -> _Res
         "reproducer": reproducer(run, outcome),
         "pose": pose(run, outcome),
         "certificate": proven,
+        "tested": tested_part(run, outcome, by_name, misreads),
     }
 
 
@@ -149,6 +162,12 @@ def _traits(run: Run, source: str) -> list[parts.TraitNote]:
         parts.TraitNote(key=t.key, text=t.text, evidence=t.evidence, lint=t.lint or "", applies=t.lint is None or t.lint in codes)
         for t in _recorded(source)
     ]
+
+
+def _misreads(source: str, traits: list[parts.TraitNote]) -> bool:
+    """Whether the engine is known to read a URDF like this one otherwise than its specification says."""
+    refusals = {t.key for t in _recorded(source) if isinstance(t, Refusal)}
+    return any(t.applies and t.lint and t.key not in refusals for t in traits)
 
 
 def _given(bound: Bound | None) -> _Given:

@@ -1,1 +1,0 @@
-"""A bound that holds for every configuration."""
