@@ -128,7 +128,10 @@ def browser(session: nox.Session) -> None:
     if chromium is None:
         session.error("no Chromium found; install it (Debian: apt install chromium), or say where it is: CHROMIUM=...")
     install(session, "browser", editable=True)
-    session.run("pytest", "tests/browser", *session.posargs, env={"CROSSCHECK_TESTS_BROWSER": str(chromium)})
+    # Those outside tests/browser need viser, which no other session installs; here none of them is skipped.
+    trust = "tests/run/test_trust.py::test_other_commands_start_nothing_either"
+    env = {"CROSSCHECK_TESTS_BROWSER": str(chromium)}
+    session.run("pytest", "tests/browser", "tests/view", trust, *session.posargs, env=env)
 
 
 @nox.session

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-import io
-import logging
 import threading
 import webbrowser
 from dataclasses import dataclass
@@ -15,15 +13,16 @@ import click
 
 from harness import api
 from harness.cli.console import console
-from harness.cli.shared import complete_robots, complete_sources, gathered, models_option
+from harness.cli.shared import complete_robots, complete_sources, gathered, models_option, robot_words
+from harness.cli.trust import allowed, trust_option
 from harness.engines.registry import REFERENCE
-from harness.errors import EngineUnavailable
+from harness.errors import EngineUnavailable, command_line
 from harness.report.text import plain
 from harness.run.options import Options
+from harness.view.guard import Guard
 from harness.view.page import Page
+from harness.view.server import start_server, stop_server
 from harness.view.session import Session
-
-LOOPBACK = "127.0.0.1"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +35,7 @@ class ViewSettings:
     seed: int
     port: int
     open_page: bool
+    trust: bool
 
 
 @click.command()
@@ -51,11 +51,13 @@ class ViewSettings:
 @click.option("--seed", type=int, default=0, show_default=True, help="Their seed.")
 @click.option("--port", type=click.IntRange(1, 65535), default=8080, show_default=True, help="Port, or the next free one.")
 @click.option("--open", "open_page", is_flag=True, help="Open the page in the browser.")
+@trust_option
 @gathered(ViewSettings, "settings")
 def view(robot: str, models: Path | None, settings: ViewSettings) -> int:
     """Show a robot's sources side by side in a local page, with a slider for each joint. Ctrl-C ends it.
 
-    The page is served to this machine alone. Needs viser: pip install 'fk-crosscheck[view]'.
+    The page is served to this machine alone, and only at the address that is printed.
+    Needs viser: pip install 'fk-crosscheck[view]'.
     """
     try:
         viser = importlib.import_module("viser")
@@ -69,15 +71,14 @@ def view(robot: str, models: Path | None, settings: ViewSettings) -> int:
         reference=settings.reference,
         certify=False,
         explain=False,
+        trust=settings.trust,
     )
-    logging.getLogger("websockets").setLevel(logging.ERROR)  # a browser that goes away is no error of ours
+    options = allowed(model, options, command_line(["crosscheck", "view", *robot_words(model.folder, models)]))
     with options.worker_pool() as workers:
-        session = Session(model, options, workers)
-        with contextlib.redirect_stdout(io.StringIO()):  # its banner; the address is told below
-            server = viser.ViserServer(host=LOOPBACK, port=settings.port, label=plain(model.name), verbose=False)
+        session, guard = Session(model, options, workers), Guard()
+        server, url = start_server(viser, guard, settings.port, plain(model.name))
         try:
-            Page(server, session)
-            url = f"http://{LOOPBACK}:{server.get_port()}"
+            Page(server, session, guard)
             for name, why in session.absent.items():
                 console().print(plain(f"{name} does not run: {why}"), markup=False, soft_wrap=True)
             console().print(
@@ -88,6 +89,5 @@ def view(robot: str, models: Path | None, settings: ViewSettings) -> int:
             with contextlib.suppress(KeyboardInterrupt):
                 threading.Event().wait()
         finally:
-            with contextlib.redirect_stdout(io.StringIO()):
-                server.stop()
+            stop_server(server)
     return 0

@@ -43,10 +43,14 @@ class Described:
 
     @cached_property
     def _lengths(self) -> float:
-        """All constant lengths of the description, added up [m]."""
-        constant = [f for f in self.mechanism.factors if f.row is None]
-        moves = sum(abs(f.value) for f in constant if f.T is None and not f.turns)
-        return float(moves + sum(np.linalg.norm(f.T[:3, 3]) for f in constant if f.T is not None))
+        """All constant lengths on the way from the base to a frame, added up: the largest such sum [m]."""
+        until = {-1: 0.0}
+        for k, factor in enumerate(self.mechanism.factors):
+            move = 0.0 if factor.turns or factor.row is not None else abs(factor.value)
+            if factor.T is not None:
+                move = float(np.linalg.norm(factor.T[:3, 3]))
+            until[k] = until[factor.parent] + move
+        return max(until[end] for end in self.mechanism.frames.values())
 
     @property
     def gain(self) -> float:
@@ -58,10 +62,11 @@ class Described:
 
             (16 (n + 2) + 8 A) u (1 + L)
 
-        u = 2^-53; n joints that move; A the sum of their |angles|; L all lengths added up, slides included, which is what a
-        sum of them may be on the way, also where the frame itself is near. The first term is the rounding of a product of
-        n + 2 rigid factors, 4u each (Higham, "Accuracy and Stability", section 3.5), times 4 for sines and constants. The
-        second is that of the angles: factor times q plus offset is off by 2u of itself, here and in the engine, times 2.
+        u = 2^-53; n joints that move; A the sum of their |angles|; L the lengths on the way to a frame added up, slides
+        included: what a position may be on the way, also where the frame itself is near. The first term is the rounding of
+        a product of n + 2 rigid factors, 4u each (Higham, "Accuracy and Stability", section 3.5), times 4 for sines and
+        constants. The second is that of the angles: factor times q plus offset is off by 2u of itself, here and in the
+        engine, times 2.
         """
         rows, values, turns = self._moved
         amounts = np.abs(q) @ rows.T + values

@@ -11,7 +11,9 @@ import numpy as np
 
 from harness.report.text import metres, numbers, plain, radians
 from harness.se3 import Array
+from harness.view.guard import Guard
 from harness.view.meshes import Meshes
+from harness.view.messages import clipped
 from harness.view.scene import Skeleton
 from harness.view.session import Apart, Place, Session
 
@@ -22,10 +24,12 @@ TRIAD = 0.09  # of the reach
 class Page:
     """One viser server's page over a session. All state is shared by everyone who has the page open."""
 
-    def __init__(self, server: Any, session: Session) -> None:
-        self._session, self._server = session, server
+    def __init__(self, server: Any, session: Session, guard: Guard) -> None:
+        self._session, self._server, self._guard = session, server, guard
         self.q = np.clip(np.zeros(len(session.model.table.joints)), *self._limits())
-        self._busy = threading.RLock()
+        self._moving = threading.RLock()  # q and the sliders
+        self._showing = threading.Lock()  # the engines and the scene
+        self._is_stale = True
         comparison = session.run.comparison
         reach = max(comparison.reach if comparison else 1.0, 0.1)
         server.scene.set_up_direction("+z")
@@ -57,9 +61,12 @@ class Page:
                 unit = "m" if model.table.kind(name) == "prismatic" else "rad"
                 low, high = float(lower[i]), float(upper[i])
                 slider = gui.add_slider(f"{plain(name)} [{unit}]", low, high, STEP, float(np.clip(self.q[i], low, high)))
-                slider.on_update(lambda event, i=i: self._slid(i, float(event.target.value)))
+                slider.on_update(lambda event, i=i: self._slid(i, event.target.value))
+                self._guard.add(slider, (low, high))
                 sliders.append(slider)
-            gui.add_button("All to zero").on_click(lambda _: self.go(np.clip(np.zeros(len(lower)), lower, upper)))
+            zero = gui.add_button("All to zero")
+            zero.on_click(lambda _: self.go(np.clip(np.zeros(len(lower)), lower, upper)))
+            self._guard.add(zero)
         return sliders
 
     def _add_sources(self, gui: Any) -> None:
@@ -67,11 +74,13 @@ class Page:
             for i, name in enumerate(self._session.sources):
                 box = gui.add_checkbox(plain(name) + (", the reference" if i == 0 else ""), True)
                 box.on_update(lambda event, name=name: self._skeletons[name].show(bool(event.target.value)))
+                self._guard.add(box)
             if self._meshes.note:
                 gui.add_html(f"<p style='padding:0 1em'>{html.escape(plain(self._meshes.note))}</p>")
             else:
                 box = gui.add_checkbox("meshes of the URDF", True)
                 box.on_update(lambda event: self._meshes.show(bool(event.target.value)))
+                self._guard.add(box)
 
     def _add_places(self, gui: Any) -> None:
         groups: dict[str, list[Place]] = {}
@@ -81,33 +90,49 @@ class Page:
             if kind in groups:
                 with gui.add_folder(f"{kind.capitalize()} configurations", expand_by_default=kind != "fixed"):
                     for place in groups[kind]:
-                        gui.add_button(plain(place.name)).on_click(lambda _, q=place.q: self.go(q))
+                        button = gui.add_button(plain(place.name))
+                        button.on_click(lambda _, q=place.q: self.go(q))
+                        self._guard.add(button)
 
-    def _slid(self, joint: int, value: float) -> None:
-        """A slider was moved. A value that only rounds the one it was set to is no move."""
-        with self._busy:
-            if abs(self.q[joint] - value) > 0.51 * STEP:
-                self.q[joint] = value
-                self.refresh()
+    def _slid(self, joint: int, given: object) -> None:
+        """A slider was moved. A value that only rounds the one it was set to is no move, nor is one that is no number."""
+        lower, upper = self._limits()
+        value = clipped(given, float(lower[joint]), float(upper[joint]))
+        with self._moving:
+            if value is None or abs(self.q[joint] - value) <= 0.51 * STEP:
+                return
+            self.q[joint] = value
+        self.refresh()
 
     def go(self, q: Array) -> None:
         """Show the configuration q (n,), exactly: sliders show it rounded."""
-        with self._busy:
+        with self._moving:
             self.q = np.array(q, dtype=float)
             for slider, value in zip(self._sliders, self.q, strict=True):
                 slider.value = float(np.clip(value, slider.min, slider.max))
-            self.refresh()
+        self.refresh()
 
     def refresh(self) -> None:
+        """Show q as it is now. While one thread shows, others go: it looks again, and moves do not pile up behind it."""
+        self._is_stale = True
+        while self._is_stale and self._showing.acquire(blocking=False):
+            try:
+                self._is_stale = False
+                self._show()
+            finally:
+                self._showing.release()
+
+    def _show(self) -> None:
         """Ask all sources at q, and show what they say."""
-        with self._busy:
-            placements = self._session.placements(self.q)
-            for name, skeleton in self._skeletons.items():
-                if name in placements:
-                    skeleton.move(placements[name])
-            self._meshes.move(self.q)
-            session = self._session
-            self._text.content = table(session.reference, session.sources[1:], session.absent, self.q, session.apart(placements))
+        with self._moving:
+            q = self.q.copy()
+        session = self._session
+        placements = session.placements(q)
+        for name, skeleton in self._skeletons.items():
+            if name in placements:
+                skeleton.move(placements[name])
+        self._meshes.move(q)
+        self._text.content = table(session.reference, session.sources[1:], session.absent, q, session.apart(placements))
 
 
 def table(reference: str, sources: Sequence[str], absent: Mapping[str, str], q: Array, rows: Sequence[Apart]) -> str:

@@ -20,7 +20,10 @@ from tests.helpers import compared, copied, crosscheck
 # The browser's path, said aloud by whoever runs these tests (nox -s browser).
 BROWSER = os.environ.get("CROSSCHECK_TESTS_BROWSER", "")
 FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--enable-unsafe-swiftshader"]
+FLAGS += ["--host-resolver-rules=MAP rebound.test 127.0.0.1"]  # a name of somebody's that leads to this machine
 SOURCES = ("dh:pinocchio", "urdf:pinocchio", "urdf:yourdfpy")
+
+PATIENCE = 180.0  # [s]: Chromium draws by software here, and shares the cores
 
 Open = Callable[..., Any]
 
@@ -42,7 +45,7 @@ def browser() -> Iterator[Any]:
         chromium.close()
 
 
-def until(page: Any, expression: str, seconds: float = 20.0) -> None:
+def until(page: Any, expression: str, seconds: float = PATIENCE) -> None:
     """Wait until a JavaScript expression is true; asked from outside, since the page's policy forbids eval."""
     end = time.monotonic() + seconds
     while not page.evaluate(expression):
@@ -58,6 +61,7 @@ def open_page(browser: Any) -> Iterator[Open]:
     def open_(address: str, width: int = 1280, scheme: str = "light", offline: bool = True, drawn: bool = True) -> Any:
         context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme, offline=offline)
         contexts.append(context)
+        context.set_default_timeout(1000.0 * PATIENCE)
         context.grant_permissions(["clipboard-read", "clipboard-write"])
         page = context.new_page()
         own = "file:" if address.startswith("file:") else address.rsplit("/", 1)[0]
@@ -67,7 +71,7 @@ def open_page(browser: Any) -> Iterator[Open]:
         page.on("request", lambda r: None if r.url.startswith((own, "data:", "blob:")) else asked.append(r.url))
         page.goto(address)
         if drawn:
-            page.wait_for_selector("html[data-drawn=yes]", timeout=60_000)
+            page.wait_for_selector("html[data-drawn=yes]")
         return page
 
     yield open_

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import contextlib
+import http.server
 import os
 import re
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import psutil
@@ -21,6 +24,18 @@ from harness.report.text import metres
 from harness.se3 import position_error
 from tests.browser.conftest import BROWSER, Open, until
 from tests.helpers import copied
+
+
+class Silent(http.server.BaseHTTPRequestHandler):
+    """An empty page for every request."""
+
+    def do_GET(self) -> None:
+        self.send_response(200)
+        self.send_header("Content-Type", "text/html")
+        self.end_headers()
+
+    def log_message(self, format: str, *args: object) -> None:
+        pass
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +57,7 @@ def served(broken: Path) -> Iterator[tuple[str, int]]:
     try:
         assert view.stdout is not None
         line = view.stdout.readline()
-        found = re.search(r"http://127\.0\.0\.1:\d+", line)
+        found = re.search(r"http://127\.0\.0\.1:\d+/[\w-]{40,}", line)
         assert found, line
         yield found[0], view.pid
         view.send_signal(signal.SIGINT)
@@ -59,7 +74,7 @@ def test_a_slider_moves_the_arm_and_the_discrepancy(
     open_page: Open, served: tuple[str, int], broken: Path, models: dict[str, RobotModel]
 ) -> None:
     page = open_page(served[0] + "/", offline=False, drawn=False)
-    page.wait_for_selector("#discrepancies table", timeout=60_000)
+    page.wait_for_selector("#discrepancies table")
     tables = [DHNumpy(model.table) for model in (load_model(broken), models["ur5"])]
 
     def shown() -> tuple[list[float], str]:
@@ -103,7 +118,7 @@ def test_a_slider_moves_the_arm_and_the_discrepancy(
 
 def test_buttons_go_to_the_worst_the_published_and_the_singular(open_page: Open, served: tuple[str, int]) -> None:
     page = open_page(served[0] + "/", offline=False, drawn=False)
-    page.wait_for_selector("#discrepancies table", timeout=60_000)
+    page.wait_for_selector("#discrepancies table")
     for name in (r"urdf:pinocchio at ", "article", r"1: smallest singular value"):
         before = page.locator("#discrepancies p").first.inner_text()
         page.get_by_role("button", name=re.compile(name)).first.click()
@@ -118,6 +133,50 @@ def test_only_this_machine_is_served(served: tuple[str, int]) -> None:
     listening = [c.laddr.ip for p in processes for c in p.net_connections() if c.status == "LISTEN"]
     assert listening
     assert set(listening) == {"127.0.0.1"}
+
+
+SOCKET = """address => new Promise(done => {
+    const socket = new WebSocket(address.replace('http', 'ws'), 'viser-v' + VERSION);
+    socket.onopen = () => done('open');
+    socket.onclose = () => done('refused');
+})"""
+
+
+def socket_from(page: Any, address: str) -> str:
+    """Whether a WebSocket from a page is `open` or `refused`."""
+    import viser
+
+    return str(page.evaluate(SOCKET.replace("VERSION", repr(viser.__version__)), address))
+
+
+def test_a_page_of_another_origin_is_refused(browser: Any, served: tuple[str, int]) -> None:
+    other = http.server.HTTPServer(("127.0.0.1", 0), Silent)
+    threading.Thread(target=other.serve_forever, daemon=True).start()
+    context = browser.new_context()
+    try:
+        page = context.new_page()
+        assert page.goto(served[0] + "/").status == 200
+        assert socket_from(page, served[0] + "/") == "open"
+        page.goto(f"http://127.0.0.1:{other.server_port}/")
+        for address in (served[0] + "/", served[0].rsplit("/", 1)[0] + "/"):
+            assert socket_from(page, address) == "refused"
+    finally:
+        context.close()
+        other.shutdown()
+        other.server_close()
+
+
+def test_a_foreign_name_that_leads_here_is_refused(browser: Any, served: tuple[str, int]) -> None:
+    context = browser.new_context()
+    try:
+        page = context.new_page()
+        foreign = served[0].replace("127.0.0.1", "rebound.test") + "/"
+        assert page.goto(foreign).status == 403
+        assert "printed" in page.inner_text("body")
+        assert socket_from(page, foreign) == "refused"
+        assert socket_from(page, served[0] + "/") == "refused"
+    finally:
+        context.close()
 
 
 def test_the_browser_is_there() -> None:

@@ -167,8 +167,11 @@ def test_other_commands_start_nothing_either(cli: Cli, stranger: Path, trace: Pa
     if command == "view":
         pytest.importorskip("viser")
     more = ("--source", "urdf:tool") if command == "mutate" else ()
-    assert cli(command, str(stranger), *more)[0] == 2
+    code, text = cli(command, str(stranger), *more)
+    assert code == 2
     assert not trace.exists()
+    if command == "view":
+        assert text.endswith(f"crosscheck view {stranger} --trust\n")
 
 
 def test_a_terminal_is_asked_and_the_answer_is_remembered(
