@@ -20,7 +20,7 @@ from harness.theorem.coefficients import Coefficients
 from harness.theorem.lower import At
 from harness.theorem.pair import Pair
 from harness.theorem.rotation import rotation_difference
-from harness.theorem.sharp import Top, highest, random_starts, sharpened
+from harness.theorem.sharp import Top, highest, is_more, random_starts, sharpened
 
 Method: TypeAlias = Literal["constant", "joints", "coefficients", "grid"]
 
@@ -118,7 +118,8 @@ def _frame(pair: Pair, name: str, effort: Effort) -> FrameBound:
 
 def _better(part: _Part, function: Coefficients) -> _Part:
     """With the bound that the coefficients give, and the largest value that climbing finds."""
-    top = max(part.found, highest(function, random_starts(function)), key=lambda t: t.value)
+    climbed = highest(function, random_starts(function))
+    top = climbed if is_more(climbed.value, part.found.value) else part.found
     bound = function.bound()
     return _Part(bound, top, "coefficients") if bound < part.upper else replace(part, found=top)
 

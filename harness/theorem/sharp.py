@@ -24,6 +24,7 @@ TARGET = 1.085  # growth between the nodes that is aimed at
 FINEST = 64  # nodes a degree
 STARTS = 32
 POINTS = 129
+SAME = 1e-9  # values that are nearer to each other, relative to their size, are equal
 WIDTHS = (1.0, 0.5, 0.02, 0.02, 0.002, 0.0005)  # of a period, each way
 
 Complex: TypeAlias = NDArray[np.complex128]
@@ -37,6 +38,16 @@ class Top:
     q: Array
 
 
+def first_largest(values: Array) -> int:
+    """The index of the first of values (N,) that is as large as the largest, but for rounding."""
+    return int(np.argmax(values >= values.max() * (1.0 - SAME)))
+
+
+def is_more(value: float, best: float) -> bool:
+    """Whether a value is larger by more than rounding: where a function is flat, that would choose the configuration."""
+    return value > best + SAME * abs(best)
+
+
 def highest(function: Coefficients, starts: Array) -> Top:
     """Climb from the best of some configurations to a local maximum, joint by joint.
 
@@ -47,14 +58,16 @@ def highest(function: Coefficients, starts: Array) -> Top:
         starts: configurations (S, n) [rad or m].
     """
     norms = np.linalg.norm(function.values(starts), axis=1)
-    q, best = starts[norms.argmax()].copy(), float(norms.max())
+    first = first_largest(norms)
+    q, best = starts[first].copy(), float(norms[first])
     moving = [j for j in range(starts.shape[1]) if function.frequencies[:, j].any() or (function.linear == j).any()]
     for width in WIDTHS:
         for j in moving:
             tries = _tries(function, q, j, width)
             norms = np.linalg.norm(function.along(q, j, tries), axis=1)
-            if norms.max() > best:
-                q[j], best = tries[norms.argmax()], float(norms.max())
+            if is_more(float(norms.max()), best):
+                first = first_largest(norms)
+                q[j], best = tries[first], float(norms[first])
     return Top(best, q)
 
 
@@ -99,7 +112,7 @@ def sharpened(function: Coefficients, top: Top, most: int) -> tuple[float, Top]:
         starts[0, axis.joint] = axis.nodes[index]
     climbed = highest(function, starts)
     bound = (size * growth + ROUNDING * plain) * (1.0 + ROUNDING) + reduced.error
-    return min(plain, bound), max(top, climbed, key=lambda t: t.value)
+    return min(plain, bound), climbed if is_more(climbed.value, top.value) else top
 
 
 @dataclass(frozen=True)
@@ -180,10 +193,10 @@ def _largest_on(function: Coefficients, axes: list[_Axis]) -> tuple[float, tuple
     best, where = -1.0, (0,) * len(axes)
     for first, values in _slices(function, axes):
         squares = np.einsum("d...,d...->...", values, values)
-        index = int(squares.argmax())
-        size = float(squares.flat[index])
-        if size > best:
-            best, where = size, (first, *(int(i) for i in np.unravel_index(index, squares.shape)))
+        size = float(squares.max())
+        if is_more(size, best):
+            where = (first, *(int(i) for i in np.unravel_index(first_largest(squares.ravel()), squares.shape)))
+        best = max(best, size)
     return math.sqrt(best), where
 
 
