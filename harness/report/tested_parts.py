@@ -35,7 +35,7 @@ class TestedTwice(Part):
     first and the second time, and how far each answer is off [m], if there is a description to tell."""
 
     change: Discrepancy
-    allowed: Discrepancy
+    allowed: NonNegative
     q: Configuration
     frame: str
     first: str

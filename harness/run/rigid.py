@@ -12,6 +12,8 @@ from harness.digits import discrepancy
 from harness.run.binding import Bound
 from harness.se3 import Array
 
+DECIMALS = 15  # of an entry of a measured offset: what a mean has behind them is rounding
+
 
 @dataclass(frozen=True)
 class Offset:
@@ -44,7 +46,7 @@ def measure_rigid(model: RobotModel, in_house: Bound, urdf_source: Bound, q: Arr
     for i, frame in enumerate(model.frames.frames):
         if frame.relation == "rigid" and i in T_base_link and np.isfinite(T_base_link[i]).all():
             T_dh_link = se3.inverse(T_base_dh[i]) @ T_base_link[i]
-            mean = se3.mean_transform(T_dh_link)
+            mean = np.round(se3.mean_transform(T_dh_link), DECIMALS) + 0.0
             spread = float(np.abs(T_dh_link - mean).max())
             offsets[frame.name] = Offset(mean, spread, urdf_source.engine.source)
     return offsets

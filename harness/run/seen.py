@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.comparison.components import Components
+from harness.digits import discrepancy, steps
 from harness.run.probes import COMPARED, KINDS, TURN, Box, Mask
 from harness.run.tested import FrameTested, KindTested, Place, Repeated, Size, Tested, repeated_allowance
 from harness.se3 import Array
@@ -121,8 +122,8 @@ class Seen:
         """What counts: the largest differences, and those that rounding does not explain, by frame."""
         counted = np.where(near, off, 0.0)
         largest = counted.max(axis=(1, 2), initial=0.0)
-        if largest.max() > self._near.max():
-            _, frame, row = (int(x) for x in np.unravel_index(int(counted.argmax()), counted.shape))
+        if self._worst is None or steps(largest).max() > steps(self._near).max():  # by less, rounding would choose
+            _, frame, row = (int(x) for x in np.unravel_index(int(steps(counted).argmax()), counted.shape))
             self._worst = self._place(answers, frame, row, off)
         np.maximum(self._near, largest, out=self._near)
         unexplained = np.where(counted > answers.allowed, counted, 0.0)
@@ -164,9 +165,10 @@ class Seen:
         off = None if answers.off is None else answers.off[..., row]
         first = self._first.setdefault(key, _First(answers.way, placed.copy(), off))
         change = np.abs(placed - first.placed).max(axis=(1, 2))
-        frame = int(change.argmax())
+        frame = int(steps(change).argmax())
         allowed = repeated_allowance(float(answers.allowed[row]))
-        if self._again is None or change[frame] / allowed > self._again.change / self._again.allowed:
+        written = discrepancy(float(change[frame])), discrepancy(self._again.change if self._again else 0.0)
+        if self._again is None or written[0] / allowed > written[1] / self._again.allowed:
             both = None
             if first.off is not None and off is not None:
                 both = tuple((float(x[0, frame]), float(x[1, frame])) for x in (first.off, off))

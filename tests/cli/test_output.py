@@ -122,6 +122,7 @@ def test_commands_whose_output_is_all(tmp_path: Path, command: str) -> None:
         "derive-dh {urdf} --out derived",
         "export-urdf sixr --out sixr.urdf",
     ],
+    ids=lambda command: command.split()[0],
 )
 def test_commands_whose_result_is_a_file(tmp_path: Path, command: str) -> None:
     """That a file was written is so whether or not somebody reads the line that says it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from harness.description.model import RobotModel, load_model
+from harness.errors import ModelFileError
 
 
 def mapped_values(model: RobotModel, q: list[float]) -> dict[str, float]:
@@ -80,3 +82,42 @@ def test_ranges_follow_the_urdf_limits_through_sign_and_zero(copy_model: Callabl
     configurations = load_model(folder).configurations
     assert configurations.lower == pytest.approx([-1, -1, -1.5, -np.pi])  # a coupled joint has no range of its own
     assert configurations.upper == pytest.approx([2, 2, 1.5, np.pi])
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "expected"),
+    [
+        ("-1", "2", (-1.0, 2.0)),
+        ("-999999", "999999", (-999999.0, 999999.0)),  # a description can hold that
+        ("-1e9", "1e9", (-np.pi, np.pi)),  # more than an angle may be: means none
+        ("-1e16", "1e16", (-np.pi, np.pi)),
+        ("0", "0", (-np.pi, np.pi)),
+        ("2", "-1", (-np.pi, np.pi)),  # the wrong way round: the lint says so
+    ],
+)
+def test_limits_that_mean_none_give_no_range(
+    copy_model: Callable[..., Path], lower: str, upper: str, expected: tuple[float, float]
+) -> None:
+    folder = copy_model("humanoid_arm")
+    urdf = folder.parent.parent / "urdf" / "humanoid_arm.urdf"
+    written = 'lower="-3.141592653589793" upper="3.141592653589793"'
+    text = urdf.read_text()
+    assert written in text
+    urdf.write_text(text.replace(written, f'lower="{lower}" upper="{upper}"', 1))
+    configurations = load_model(folder).configurations
+    assert (configurations.lower[0], configurations.upper[0]) == pytest.approx(expected)
+
+
+def test_a_slide_whose_limits_mean_none_has_no_range(copy_model: Callable[..., Path]) -> None:
+    """No range can be assumed for it: the model has to give one."""
+    folder = copy_model("stanford")
+    urdf = folder.parent.parent / "urdf" / "stanford.urdf"
+    head, tail = urdf.read_text().split('type="prismatic"')
+    limit = re.search(r"<limit[^>]*>", tail)
+    assert limit is not None
+    wide = '<limit lower="-1e10" upper="1e10" effort="1" velocity="1"/>'
+    urdf.write_text(head + 'type="prismatic"' + tail.replace(limit[0], wide, 1))
+    configurations = folder / "configurations.toml"
+    configurations.write_text(configurations.read_text().partition("[random")[0])
+    with pytest.raises(ModelFileError, match=r"prismatic joint '\w+' has no range; add \[random.limits\]"):
+        load_model(folder)
