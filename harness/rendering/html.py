@@ -18,11 +18,11 @@ from harness.rendering.markdown import render_markdown
 from harness.report.document import Report, Source
 from harness.report.explanation import Explanation
 from harness.report.model_parts import Link, ParameterPair
-from harness.report.proven import for_all, proven_text
+from harness.report.proven import at_most, for_all
 from harness.report.results import PairResult
 from harness.report.sentences import change_of, changed_text, difference, moved_text
 from harness.report.source_parts import FrameResult
-from harness.report.tested import further_out, own_description
+from harness.report.tested import all_tested, further_out, own_description
 from harness.report.text import degrees, metres, numbers, pasteable, plain, point, quantity, radians
 from harness.report.verdicts import Verdict
 
@@ -73,7 +73,8 @@ def render_html(report: Report) -> str:
         failing=failing(report),
         causes=_causes(report),
         misfiled=[p for p in report.published if p.found == "wrong" and p.status == "holds"],
-        proven=proven_text(report.theorem, [b.frame for b in report.theorem.frames]) if report.theorem else "",
+        proven=at_most(report.theorem) if report.theorem and report.theorem.frames else "",
+        all_tested=all_tested(report.sources),
         blind={frame.name for frame in report.frames if frame.relation == "rigid"},
         side_by_side=_side_by_side(report),
         certified=[s for s in report.sources if s.certificate],

@@ -8,7 +8,7 @@ from pydantic import model_validator
 
 from harness.report.parts import Configuration, Finite, LowerBound, Part, UpperBound
 
-Equality = Literal["equal", "equal but for the digits of pi", "not equal", "not decided"]
+Equality = Literal["equal", "equal but for the digits of pi", "not equal", "not decided", "offset measured"]
 
 
 class FrameBound(Part):
@@ -37,8 +37,8 @@ class Range(Part):
 class Theorem(Part):
     """What is proven of the table and the URDF, from their numbers alone, for every angle of every joint that turns.
 
-    equality: for each frame, whether both are the same function. worst: the configuration of `position_found`, for
-    frames at which that is more than rounding.
+    equality: for each frame, whether both are the same function; nothing is said of one whose offset an engine has measured.
+    worst: the configuration of `position_found`, for frames at which that is more than rounding.
     slides: the range that each joint which slides is looked at in.
     """
 

@@ -38,7 +38,7 @@ def theorem(run: Run) -> proofs.Theorem | None:
         return None
     return proofs.Theorem(
         frames=[_bound(run, name, bound) for name, bound in run.theorem.frames.items()],
-        equality=dict(run.theorem.equality),
+        equality={n: "offset measured" if n in run.offsets else word for n, word in run.theorem.equality.items()},
         worst={n: b.worst[0].tolist() for n, b in run.theorem.frames.items() if b.position_found > WORTH_TELLING},
         slides={joint: proofs.Range(lower=lower, upper=upper) for joint, (lower, upper) in run.theorem.ranges.items()},
     )

@@ -11,6 +11,7 @@ from harness.report.proof_parts import Theorem
 from harness.report.proven import proven_text
 from harness.report.regression import Regression
 from harness.report.sentences import worsened
+from harness.report.tested import all_tested
 from harness.report.text import metres, radians
 from harness.report.verdicts import Verdict
 from harness.se3 import REPEATED
@@ -58,6 +59,7 @@ def gate(
     if accepted:
         sentence += f", {accepted} deviations as accepted"
     sentence += _proven(compared, theorem)
+    sentence += f"; {text}" if (text := all_tested(sources)) else ""
     sentence += _asides(sources, settings)
     return doc.GateVerdict(exit_code=0, sentence=sentence)
 
