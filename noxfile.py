@@ -94,9 +94,9 @@ def crosscheck(session: nox.Session) -> None:
 
 @nox.session
 def tests(session: nox.Session) -> None:
-    """The test suite on this Python with the newest pin."""
+    """The test suite on this Python with the newest pin, a process a core; a file's tests share one, and its workers."""
     install(session, "tests", editable=True)
-    session.run("pytest", *session.posargs)
+    session.run("pytest", "--numprocesses", "auto", "--dist", "loadfile", *session.posargs)
 
 
 @nox.session
