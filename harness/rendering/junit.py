@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
-from harness.report.document import PublishedResult, Report, Source
+from harness.report.document import Report, Source
+from harness.report.published_part import PublishedResult
 from harness.report.regression import Regression
 from harness.report.sentences import why, worsened
 from harness.report.source_parts import FrameResult

@@ -8,29 +8,17 @@ do that, see `harness.digits`.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
-from harness.digits import coordinate
 from harness.report.explanation import Explanation
 from harness.report.model_parts import SideBySide, Trees
 from harness.report.notebook import html_lines, html_table, text_table
-from harness.report.parts import (
-    Configuration,
-    Coordinate,
-    Count,
-    Discrepancy,
-    Finite,
-    Matrix,
-    NonNegative,
-    Part,
-    RobotName,
-    Rotation,
-    Vector,
-)
+from harness.report.parts import Configuration, Count, Discrepancy, Finite, Matrix, NonNegative, Part, Reach, RobotName
 from harness.report.pose import Pose
 from harness.report.proof_parts import Certificate, Theorem
+from harness.report.published_part import PublishedResult
 from harness.report.regression import Regression
 from harness.report.source_parts import FrameResult, Reproducer, Tolerance, TraitNote, Validity
 from harness.report.tested_parts import Tested
@@ -144,26 +132,6 @@ class PairResult(Part):
     rotation_frame: str
 
 
-class PublishedResult(Part):
-    """A published placement, as claimed and as computed by the in-house FK. Errors are largest entry differences."""
-
-    configuration: str
-    frame: str
-    relative_to: str
-    provenance: str
-    status: Literal["holds", "wrong"]
-    found: Literal["holds", "wrong"]
-    reason: str
-    claimed_position: Vector
-    claimed_rotation: Rotation | None
-    computed: Matrix
-    computed_rpy: Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
-    tolerance: NonNegative
-    rotation_tolerance: NonNegative
-    position_error: Discrepancy
-    rotation_error: Discrepancy | None
-
-
 class Lint(Part):
     """A finding about the URDF, the table or the mapping."""
 
@@ -184,7 +152,7 @@ class Robot(Part):
     joints: list[str]
     lower: list[Finite]
     upper: list[Finite]
-    reach: Annotated[NonNegative, AfterValidator(coordinate)]
+    reach: Reach
     hashes: dict[str, str]
 
     @model_validator(mode="after")

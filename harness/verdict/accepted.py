@@ -15,8 +15,9 @@ from pydantic import ValidationError
 
 from harness.errors import InputError, command_line
 from harness.reading import MODEL_BYTES, parsed_json, read_text
-from harness.report.document import GateVerdict, PublishedResult, Report, Robot, Settings, Source
+from harness.report.document import GateVerdict, Report, Robot, Settings, Source
 from harness.report.parts import NonNegative, Part
+from harness.report.published_part import PublishedResult
 from harness.report.regression import Changed, Moved, Quantity, Regression
 
 FOLDER = "accepted"

@@ -12,6 +12,7 @@ from harness.description.published import Published
 from harness.engines.lint_traits import messages
 from harness.report import document as doc
 from harness.report.proof_parts import Theorem
+from harness.report.published_part import PublishedResult
 from harness.run.outcome import Run
 from harness.verdict.accepted import AcceptedNumbers, since
 from harness.verdict.evidence import theorem
@@ -29,7 +30,7 @@ class _Judged:
     robot: doc.Robot
     settings: doc.Settings
     sources: list[doc.Source]
-    published: list[doc.PublishedResult]
+    published: list[PublishedResult]
     theorem: Theorem | None
     verdict: doc.GateVerdict
 
@@ -145,12 +146,12 @@ def _pairs(run: Run) -> list[doc.PairResult]:
     ]
 
 
-def _published(run: Run, configuration: Configuration, claim: Published) -> doc.PublishedResult:
+def _published(run: Run, configuration: Configuration, claim: Published) -> PublishedResult:
     """Check a claim against the in-house FK, whatever the reference of the run is."""
     T_base_a, T_base_b = run.in_house.engine.placements(configuration.q[None, :], (claim.relative_to, claim.dh))[0]
     T_a_b = se3.inverse(T_base_a) @ T_base_b
     check = check_claim(claim, T_a_b)
-    return doc.PublishedResult(
+    return PublishedResult(
         configuration=configuration.name,
         frame=claim.dh,
         relative_to=claim.relative_to,

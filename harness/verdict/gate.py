@@ -8,6 +8,7 @@ from harness.errors import ExitCode
 from harness.report import document as doc
 from harness.report.proof_parts import Theorem
 from harness.report.proven import proven_text
+from harness.report.published_part import PublishedResult
 from harness.report.regression import Regression
 from harness.report.sentences import worsened
 from harness.report.text import metres, radians
@@ -28,7 +29,7 @@ def combined(codes: Iterable[int]) -> int:
 def gate(
     robot: str,
     sources: Sequence[doc.Source],
-    published: Sequence[doc.PublishedResult],
+    published: Sequence[PublishedResult],
     settings: doc.Settings,
     theorem: Theorem | None,
 ) -> doc.GateVerdict:
@@ -93,7 +94,7 @@ def _proven(compared: list[doc.Source], theorem: Theorem | None) -> str:
     return f"; {text}{' (accepted deviations aside)' if aside else ''}" if text else ""
 
 
-def _misfiled(claims: list[doc.PublishedResult]) -> str:
+def _misfiled(claims: list[PublishedResult]) -> str:
     first, more = claims[0], len(claims) - 1
     rotation = "" if first.rotation_error is None else f", {first.rotation_error:.2g} in the rotation"
     return (
