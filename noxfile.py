@@ -1,6 +1,7 @@
 """Every step of CI, to be run at home.
 
-`nox -s crosscheck`, `tests`, `browser`, `mutate`, `engines`, `cpp`, `matrix`, `lint`, `types`, `bench`, `audit`, `lock`.
+`nox -s crosscheck`, `tests`, `browser`, `mutate`, `engines`, `cpp`, `matrix`, `lint`, `types`, `bench`, `guards`,
+`audit`, `lock`.
 
 What a session installs is in a lock file of its own, `locks/SESSION.txt`, with the hash of every file; `nox -s lock` writes
 them anew from pyproject.toml and constraints.txt. torch is the exception: its CPU build may be a file of this machine.
@@ -184,6 +185,13 @@ def bench(session: nox.Session) -> None:
     session.run("python", "bench/theorem.py")
     session.run("python", "bench/soundness.py", *(session.posargs or ["10000"]))
     session.run("python", "bench/derive_all.py")
+
+
+@nox.session
+def guards(session: nox.Session) -> None:
+    """Take each guard out once, in a copy of the tree, and see its test fail."""
+    install(session, "tests", editable=True)
+    session.run("python", "bench/guards.py", *session.posargs)
 
 
 @nox.session
