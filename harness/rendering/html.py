@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
+from functools import cache
 from typing import NamedTuple
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -36,6 +37,7 @@ class Cell(NamedTuple):
     anchor: str
 
 
+@cache  # it keeps the compiled templates: to compile one takes longer than to fill it
 def _environment() -> Environment:
     env = Environment(
         loader=PackageLoader("harness.rendering", "templates"),
