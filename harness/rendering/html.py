@@ -16,7 +16,7 @@ from markupsafe import escape
 from harness.rendering import scripts
 from harness.rendering.figures import apart, distribution, skeletons
 from harness.rendering.markdown import render_markdown
-from harness.report.document import PairResult, Report, Source
+from harness.report.document import Frame, PairResult, Report, Source
 from harness.report.explanation import Explanation
 from harness.report.model_parts import Link, ParameterPair
 from harness.report.sentences import change_of, changed_text, difference, for_all, moved_text
@@ -68,6 +68,8 @@ def render_html(report: Report) -> str:
         pairs=_numbered(report),
         frames=[frame.name for frame in report.frames],
         by_frame={s.name: {f.frame: f for f in s.frames} for s in report.sources},
+        bounds={s.name: {b.frame: b for b in s.certificate.frames} for s in report.sources if s.certificate},
+        mapped=_by_dh(report),
         anchors={s.name: f"source-{i}" for i, s in enumerate(report.sources)},
         failing=failing(report),
         causes=_causes(report),
@@ -184,6 +186,14 @@ def _side_by_side(report: Report) -> list[tuple[str, list[str], list[tuple[str, 
         heads = [f"{p.parameter} [{'mm' if p.unit == 'm' else 'deg'}]" for p in chosen[0][1]] if chosen else []
         tables.append((title, heads, chosen))
     return [table for table in tables if table[2]]
+
+
+def _by_dh(report: Report) -> dict[str, list[Frame]]:
+    """The mapped frames on each DH frame, by its label."""
+    mapped: dict[str, list[Frame]] = {}
+    for frame in report.frames:
+        mapped.setdefault(frame.dh, []).append(frame)
+    return mapped
 
 
 def _tree(report: Report) -> list[tuple[int, Link]]:
