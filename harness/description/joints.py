@@ -262,7 +262,7 @@ def random_limits(table: DHTable, urdf: Urdf | None, joint_map: JointMap | None)
         for row, joint_name in enumerate(joint_map.names):
             joint, a = urdf.joints[joint_name], joint_map.A[row]
             alone = single[row] and abs(a[i]) == 1.0 and joint.mimic is None
-            if alone and joint.type != "continuous" and joint.limits and _is_range(joint.limits, joint.type == "prismatic"):
+            if alone and joint.type != "continuous" and joint.limits and is_range(joint.limits, joint.type == "prismatic"):
                 ends = sorted((limit - joint_map.b[row]) / a[i] for limit in joint.limits)
                 slides = joint.type == "prismatic"
                 ranges[name] = _sane(float(ends[0]), float(ends[1])) if slides else (float(ends[0]), float(ends[1]))
@@ -277,6 +277,6 @@ def _sane(lower: float, upper: float) -> tuple[float, float]:
     return low, high
 
 
-def _is_range(limits: tuple[float, float], slides: bool) -> bool:
+def is_range(limits: tuple[float, float], slides: bool) -> bool:
     """Whether configurations can be drawn between two limits [m if it slides, else rad]."""
     return limits[0] < limits[1] and max(map(abs, limits)) <= (LARGEST_LENGTH if slides else LARGEST_ANGLE)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
+from functools import cache
 from typing import NamedTuple
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -15,7 +16,7 @@ from markupsafe import escape
 from harness.rendering import scripts
 from harness.rendering.figures import apart, distribution, skeletons
 from harness.rendering.markdown import render_markdown
-from harness.report.document import Report, Source
+from harness.report.document import Frame, Report, Source
 from harness.report.explanation import Explanation
 from harness.report.model_parts import Link, ParameterPair
 from harness.report.proven import at_most, for_all
@@ -39,6 +40,7 @@ class Cell(NamedTuple):
     anchor: str
 
 
+@cache  # it keeps the compiled templates: to compile one takes longer than to fill it
 def _environment() -> Environment:
     env = Environment(
         loader=PackageLoader("harness.rendering", "templates"),
@@ -69,6 +71,7 @@ def render_html(report: Report) -> str:
         pairs=_numbered(report),
         frames=[frame.name for frame in report.frames],
         by_frame={s.name: {f.frame: f for f in s.frames} for s in report.sources},
+        mapped=_by_dh(report),
         anchors={s.name: f"source-{i}" for i, s in enumerate(report.sources)},
         failing=failing(report),
         causes=_causes(report),
@@ -181,6 +184,14 @@ def _side_by_side(report: Report) -> list[tuple[str, list[str], list[tuple[str, 
         heads = [f"{p.parameter} [{'mm' if p.unit == 'm' else 'deg'}]" for p in chosen[0][1]] if chosen else []
         tables.append((title, heads, chosen))
     return [table for table in tables if table[2]]
+
+
+def _by_dh(report: Report) -> dict[str, list[Frame]]:
+    """The mapped frames on each DH frame, by its label."""
+    mapped: dict[str, list[Frame]] = {}
+    for frame in report.frames:
+        mapped.setdefault(frame.dh, []).append(frame)
+    return mapped
 
 
 def _tree(report: Report) -> list[tuple[int, Link]]:

@@ -7,6 +7,7 @@ do that, see `harness.digits`.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from typing import Annotated, Literal
 
@@ -35,6 +36,13 @@ from harness.report.text import metres, plain, radians
 from harness.report.verdicts import SourceVerdict
 
 WORDS = {0: "PASS", 1: "FAIL", 3: "INCOMPLETE"}
+
+
+def _require_different(names: Iterable[str], what: str) -> None:
+    """Raise ValueError if two are the same."""
+    counts = Counter(names)
+    if (twice := next((name for name, count in counts.items() if count > 1), None)) is not None:
+        raise ValueError(f"it has {counts[twice]} {what} called {twice!r}")
 
 
 def _require(names: Iterable[str], known: set[str], what: str) -> None:
@@ -227,6 +235,8 @@ class Report(Part):
     @model_validator(mode="after")
     def _speaks_of_what_it_has(self) -> Report:
         """What renders a document looks things up by name. What is not there is refused here, in one line."""
+        _require_different((s.name for s in self.sources), "sources")
+        _require_different((f.name for f in self.frames), "frames")
         sources, frames = {s.name for s in self.sources}, {f.name for f in self.frames}
         _require((name for pair in self.pairs for name in (pair.a, pair.b)), sources, "source")
         _require((place for source in self.sources for place in source.places()), frames, "frame")

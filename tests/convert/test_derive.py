@@ -278,6 +278,18 @@ def test_a_refusal_that_no_trait_knows_has_the_words_of_the_library(tmp_path: Pa
     assert "\n" not in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    "limit", ["lower='-1' upper='1e16'", "lower='-1e16' upper='1e16'", "lower='1' upper='1'", "lower='-1e10' upper='0'"]
+)
+def test_a_slide_whose_limits_mean_none_gets_a_range(cli: Cli, tmp_path: Path, limit: str) -> None:
+    """Without one the model that was derived could not be read back."""
+    text = REFUSED.replace("LIMIT", f"<limit {limit} effort='1' velocity='1'/>").replace("revolute", "prismatic")
+    (tmp_path / "arm.urdf").write_text(text)
+    result = cli("derive-dh", "arm.urdf", "--out", "models")
+    assert (result.returncode, result.stderr) == (0, "")
+    assert "j = [-1, 1]" in (tmp_path / "models" / "arm" / "configurations.toml").read_text().replace('"', "")
+
+
 def test_a_follower_without_a_leader_is_refused_on_the_chain(tmp_path: Path) -> None:
     limit = "<limit lower='-1' upper='1' effort='1' velocity='1'/><mimic joint='nobody'/>"
     (tmp_path / "arm.urdf").write_text(REFUSED.replace("LIMIT", limit))
