@@ -133,7 +133,10 @@ TOO_MUCH: dict[str, tuple[Callable[[Document], object], str]] = {
         "at most 50000 frames of all sources together, got 5",
     ),
     "joints": (
-        lambda d: [d["robot"].update(joints=["j"] * 1001, lower=[0] * 1001, upper=[0] * 1001), d.update(sources=[], pairs=[])],
+        lambda d: [
+            d["robot"].update(joints=["j"] * 1001, lower=[0] * 1001, upper=[0] * 1001),
+            d.update(sources=[], pairs=[], theorem=None),
+        ],
         "at most 1000 joints, got 1001",
     ),
     "letters of a source": (lambda d: d["sources"].append(small("x" * 1001)), "names of at most 1000 letters, got one of 1001"),
