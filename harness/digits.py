@@ -48,7 +48,8 @@ def lower_bound(x: float) -> float:
 
 def measured_bounds(lower: float, upper: float) -> tuple[float, float]:
     """Both of a frame whose offset an engine has measured, to 1e-13 outwards: the offset is not known better."""
-    return max(0.0, math.floor(lower / MEASURED) * MEASURED), math.ceil(upper / MEASURED) * MEASURED
+    low, high = (round(f(x / MEASURED) * MEASURED, 13) for f, x in ((math.floor, lower), (math.ceil, upper)))
+    return low, high
 
 
 def _significant(x: float, digits: int, up: bool) -> float:
