@@ -127,7 +127,7 @@ class Source(Part):
 
 
 class Frame(Part):
-    """One mapped frame. `offset` is T_dh_frame: declared, or if rigid the mean over all configurations (a lattice of 1021)."""
+    """One mapped frame. `offset` is T_dh_frame: declared, or if rigid the mean over a lattice of 1021 configurations."""
 
     name: str
     dh: str
@@ -161,8 +161,9 @@ class Robot(Part):
 
 class Settings(Part):
     """What was asked for. `not_chosen`: sources of model.toml that the command line left out. `gate`: what decides, the
-    configurations sampled or the certificate. `fixed` and `samples` count configurations, `subset` those on which all pairs
-    are compared. `probe_seed`: of the configurations at which each engine was tested against its own description."""
+    configurations sampled, or also what is proven of the two descriptions. `fixed` and `samples` count configurations,
+    `subset` those on which all pairs are compared. `probe_seed`: of the configurations at which each engine was tested
+    against its own description."""
 
     reference: str
     sources: list[str]

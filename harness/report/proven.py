@@ -35,7 +35,7 @@ def at_most(theorem: Theorem) -> str:
 
 
 def _slides(theorem: Theorem) -> str:
-    ranges = [f"{joint} from {metres(r.lower)} to {metres(r.upper)}" for joint, r in theorem.slides.items()]
+    ranges = [f"{joint} from {r.lower:g} to {r.upper:g} m" for joint, r in theorem.slides.items()]
     return f" with {', '.join(ranges)}" if ranges else ""
 
 

@@ -1,4 +1,4 @@
-"""What a report shows for a source's verdict: certificate, explanation, reproducer, and both sides where it is worst."""
+"""What a report shows for a source's verdict: what is proven of the files, why, reproducer, and both sides where it is worst."""
 
 from __future__ import annotations
 
