@@ -47,7 +47,8 @@ def chains(table: DHTable) -> Chains:
 
 def proven(a: DHTable, b: DHTable, effort: Effort) -> FrameBound:
     """What is proven of two tables."""
-    return prove(chains(a), chains(b), np.tile([-SLIDE, SLIDE], (len(a.joints), 1)), effort)["end"]
+    reach = np.array([SLIDE * (a.kind(joint) == "prismatic") for joint in a.joints])
+    return prove(chains(a), chains(b), np.stack([-reach, reach], axis=1), effort)["end"]
 
 
 def seen(a: DHTable, b: DHTable, bound: FrameBound) -> tuple[float, float]:

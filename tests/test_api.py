@@ -59,6 +59,7 @@ def test_importing_the_package_imports_nothing_else() -> None:
 def test_the_difference_says_which_number(shifted: harness.Difference) -> None:
     assert not shifted.same
     assert shifted.largest.position == pytest.approx(0.000301, abs=1e-12)
+    assert shifted.bound is not None
     assert shifted.bound.position >= shifted.largest.position
     (cause,) = shifted.causes
     assert (cause.subject, cause.parameter, cause.unit) == ("shoulder_pan_joint", "d", "m")

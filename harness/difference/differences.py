@@ -42,7 +42,7 @@ def diff(a: Operand, b: Operand, tolerance: tuple[float, float]) -> Difference:
     mechanism = _mechanism(problem.a)
     unexplained = "" if same or explanation else first_difference(problem, mechanism.joints, mechanism.prismatic)
     proven = _theorem(a, b, names)
-    tip = proven.frames[TIP]
+    tip = proven.frames.get(TIP)
     errors = [max(x) for x in zip(*(start.errors(part) for part in PARTS), strict=True)]
     recipes = (problem.a, problem.b) if first is a else (problem.b, problem.a)
     convention: Convention = next((o.table.convention for o in (a, b) if o.table is not None), "standard")
@@ -57,7 +57,7 @@ def diff(a: Operand, b: Operand, tolerance: tuple[float, float]) -> Difference:
         a=a,
         b=b,
         same=same,
-        largest=Largest(max(errors[0], tip.position_found), max(errors[1], tip.rotation_found)),
+        largest=Largest(max(errors[0], tip.position_found), max(errors[1], tip.rotation_found)) if tip else Largest(*errors),
         theorem=proven,
         tolerance=Largest(*tolerance),
         joints=names,
@@ -99,5 +99,10 @@ def _problem(a: Operand, b: Operand, names: dict[str, str], tolerance: tuple[flo
 
 def _theorem(a: Operand, b: Operand, names: dict[str, str]) -> Theorem:
     """What is proven for every angle, and for prismatic joints within half a metre either way."""
-    ranges = {joint: (-SLIDE, SLIDE) for joint, slides in zip(a.joints, a.prismatic, strict=True) if slides}
-    return theorem(a.chains(a.joints, {j: j for j in a.joints}), b.chains(a.joints, names), ranges)
+    one, other = a.chains(a.joints, {j: j for j in a.joints}), b.chains(a.joints, names)
+    ranges = {
+        joint: (-SLIDE, SLIDE) if slides else (-math.pi, math.pi)  # one that turns and slides has a range too
+        for j, (joint, slides) in enumerate(zip(a.joints, a.prismatic, strict=True))
+        if slides or one.slides(j) or other.slides(j)
+    }
+    return theorem(one, other, ranges)

@@ -75,9 +75,9 @@ class Difference:
     matching: Matching | None
 
     @property
-    def bound(self) -> Largest:
+    def bound(self) -> Largest | None:
         """No configuration has a larger discrepancy: position [m] and rotation [rad]. Proven."""
-        return Largest(self.theorem.position, self.theorem.rotation)
+        return Largest(self.theorem.position, self.theorem.rotation) if self.theorem.frames else None
 
     @property
     def causes(self) -> tuple[Change, ...]:
@@ -118,7 +118,8 @@ class Difference:
         seen = f"up to {metres(self.largest.position)}, {radians(self.largest.rotation)} apart"
         slides = [f"{joint} from {low:g} to {high:g} m" for joint, (low, high) in self.theorem.ranges.items()]
         where = f"for all q{' with ' if slides else ''}{', '.join(slides)}"
-        proven = f"{where} at most {metres(self.bound.position)}, {radians(self.bound.rotation)} (proven)"
+        bound = self.bound
+        proven = f"{where} at most {metres(bound.position)}, {radians(bound.rotation)} (proven)" if bound else "nothing is proven"
         return Line(plain(f"{word} {self.a.label} and {self.b.label}: {seen}; {proven}"), kind)
 
     def reasons(self) -> Iterator[Line]:

@@ -50,7 +50,7 @@ class Theorem(Part):
     @property
     def is_equal(self) -> bool:
         """Whether both are the same function at every frame."""
-        return set(self.equality.values()) == {"equal"}
+        return set(self.equality.values()) == {"equal"}  # no frame, no equality
 
     def require(self, frames: set[str], joints: int) -> None:
         """Raise ValueError unless it speaks of these frames alone, of each in full, and of so many joints."""

@@ -30,18 +30,28 @@ def prove_all(run: Run) -> None:
 
 
 def slides_of(model: RobotModel) -> dict[str, tuple[float, float]]:
-    """The range of each joint that slides, lower and upper end [m]: its limits, and what fixed configurations take.
+    """The range of each joint that slides something, lower and upper end [m, or rad of one that turns and slides].
 
-    Cut to 10 m each way from the point of it that is nearest to zero: limits of kilometres mean none.
+    Its limits, and what fixed configurations take; cut to 10 m each way from the point that is nearest to zero: limits of
+    kilometres mean none.
     """
     law, ranges = model.configurations, {}
     for j, joint in enumerate(model.table.joints):
-        if model.table.kind(joint) == "prismatic":
+        slides = model.table.kind(joint) == "prismatic"
+        if slides or _drives_a_slide(model, j):
             lower = min(float(law.lower[j]), float(law.fixed_q[:, j].min(initial=math.inf)))
             upper = max(float(law.upper[j]), float(law.fixed_q[:, j].max(initial=-math.inf)))
             nearest = float(np.clip(0.0, lower, upper))
-            ranges[joint] = (max(lower, nearest - SLIDE), min(upper, nearest + SLIDE))
+            ranges[joint] = (max(lower, nearest - SLIDE), min(upper, nearest + SLIDE)) if slides else (lower, upper)
     return ranges
+
+
+def _drives_a_slide(model: RobotModel, joint: int) -> bool:
+    """Whether a joint moves a slide of the URDF: a screw, or a slide that follows it."""
+    if model.urdf is None or model.urdf_joints is None:
+        return False
+    driven = zip(model.urdf_joints.names, model.urdf_joints.A[:, joint], strict=True)
+    return any(factor and model.urdf.joints[name].type == "prismatic" for name, factor in driven)
 
 
 def _certified(run: Run, outcome: Outcome) -> Certified:

@@ -73,6 +73,10 @@ class Chains:
     joints: tuple[str, ...]
     paths: Mapping[str, Path]
 
+    def slides(self, joint: int) -> bool:
+        """Whether a joint, by its index, slides something, whatever else it does."""
+        return any(not step.turns and step.row and step.row[joint] for path in self.paths.values() for step in path)
+
     def asked(self, joints: tuple[str, ...], own: Sequence[int]) -> Chains:
         """The description as a function of joints in another order, or of other names.
 

@@ -72,15 +72,18 @@ class Coefficients:
 
     def sizes(self) -> Array:
         """Upper bound on each term, (K,)."""
+        reach = np.abs(self.ranges).max(axis=1)
+        return self._per_unit() * np.where(self.linear < 0, 1.0, reach[np.where(self.linear < 0, 0, self.linear)])
+
+    def _per_unit(self) -> Array:
+        """Upper bound on each term, of one that is linear in a joint for one metre or radian of it, (K,)."""
         # Squares of numbers below 1e-154 vanish in float64: a power of two is taken out before, and put back.
         top = max(np.abs(self.real).max(initial=0.0), np.abs(self.imaginary).max(initial=0.0))
         unit = 2.0 ** (math.frexp(float(top))[1]) if top > 0.0 else 1.0
         x, y = self.real / unit, self.imaginary / unit
         a, b, c = (x**2).sum(axis=1), (y**2).sum(axis=1), (x * y).sum(axis=1)
         sigma = unit * np.sqrt((a + b) / 2.0 + np.sqrt(((a - b) / 2.0) ** 2 + c**2))
-        reach = np.abs(self.ranges).max(axis=1)
-        weight = np.where(self.linear < 0, 1.0, reach[np.where(self.linear < 0, 0, self.linear)])
-        return np.asarray(np.where(self.frequencies.any(axis=1), 2.0, 1.0) * weight * sigma)
+        return np.asarray(np.where(self.frequencies.any(axis=1), 2.0, 1.0) * sigma)
 
     def bound(self) -> float:
         """Upper bound on the norm over every configuration."""
@@ -90,11 +93,8 @@ class Coefficients:
         return float(sizes.sum()) * (1.0 + ROUNDING) + vanished + self.error
 
     def slope(self) -> float:
-        """Upper bound on how fast the function changes with its slides, all together, per metre."""
-        linear = self.linear >= 0
-        reach = np.abs(self.ranges).max(axis=1)[np.where(linear, self.linear, 0)]
-        per_metre = np.divide(self.sizes(), reach, out=np.zeros(len(linear)), where=linear & (reach > 0.0))
-        return float(per_metre.sum()) * (1.0 + ROUNDING)
+        """Upper bound on how fast the function changes with its slides, all together, per metre or radian."""
+        return float(self._per_unit()[self.linear >= 0].sum()) * (1.0 + ROUNDING)
 
     def without(self, terms: NDArray[np.bool_]) -> Coefficients:
         """The function without some terms, whose sizes are added to the error."""

@@ -20,6 +20,7 @@ from harness.theorem.scales import scales_of
 
 MOST_TERMS = 10_000  # of one polynomial: nine joints that turn
 TRIED = 6  # configurations
+LARGEST_SCALE = 10**6  # of a frequency: beyond, a factor has more digits than any mechanism
 NEGLIGIBLE = 1e-3  # share of a bound that what is left behind may have
 
 
@@ -62,7 +63,7 @@ class Pair:
     ranges: Array
     scales: tuple[int, ...]
     _gauge: Gauge = field(default_factory=Gauge)
-    _known: dict[Motion, Polynomial] = field(default_factory=dict)
+    _known: dict[tuple[Motion, tuple[Motion | None, ...]], Polynomial] = field(default_factory=dict)
 
     @classmethod
     def of(cls, a: Chains, b: Chains, ranges: Array) -> Pair:
@@ -100,32 +101,34 @@ class Pair:
         return slope * (1.0 + 1e-12)
 
     @cached_property
-    def _start(self) -> Start:
-        """How many joints from the base drop out: what they leave behind is a small share of the largest bound."""
-        rough = {name: self.by_joints(name)[0] for name in self.names}
-        name = max(self.names, key=lambda n: len(self.a[n].motions))
+    def _most(self) -> tuple[float, float]:
+        """What joints that drop out may leave behind, position [m] and chord: a small share of the largest bound."""
+        rough = [self.by_joints(name)[0] for name in self.names]
+        largest = [max((bound[i] for bound in rough if math.isfinite(bound[i])), default=0.0) for i in range(2)]
+        return NEGLIGIBLE * largest[0], NEGLIGIBLE * largest[1]
+
+    def _start(self, name: str) -> Start:
+        """How many of a frame's joints, from the base, drop out: what they leave behind is little."""
         line, other = self.a[name], self.b[name]
         if len(line.motions) != len(other.motions):
             return Start(0, None)
-        most = [NEGLIGIBLE * max(bound[i] for bound in rough.values()) for i in range(2)]
         start, reach = Start(0, None), reaches(line, self.ranges)
         for depth, (x, y) in enumerate(zip(line.motions, other.motions, strict=True)):
             at = self._gauge.before(x, y)
-            if at is None or any(left > limit for left, limit in zip(carried(at, reach), most, strict=True)):
+            if at is None or any(left > limit for left, limit in zip(carried(at, reach), self._most, strict=True)):
                 break
             start = Start(depth, at)
         return start
 
     def multiplied_out(self, name: str) -> tuple[Coefficients, Coefficients] | None:
         """The difference of both chains at a frame as polynomials, position and rotation. None if they have too many terms."""
-        start, lines = self._start, (self.a[name], self.b[name])
-        if any(_terms(line, start.depth) > MOST_TERMS for line in lines):
+        start, lines = self._start(name), (self.a[name], self.b[name])
+        if any(_terms(line, start.depth) > MOST_TERMS for line in lines) or max(self.scales, default=1) > LARGEST_SCALE:
             return None
-        if start.deviation is not None and min(len(line.motions) for line in lines) <= start.depth:
-            return None  # before the first difference: constants say it all
         deviation = start.deviation
         begins = (deviation.E, identity()) if deviation is not None else (None, None)
-        one, other = (self._finished(line, begin) for line, begin in zip(lines, begins, strict=True))
+        key = tuple(line.motions[start.depth] if start.depth < len(line.motions) else None for line in lines)
+        one, other = (self._finished(line, start.depth, begin, key) for line, begin in zip(lines, begins, strict=True))
         functions = [of_terms(subtract(x, y), self.scales, self.ranges) for x, y in zip(one, other, strict=True)]
         left = carried(deviation, reaches(lines[0], self.ranges)) if deviation is not None else (0.0, 0.0)
         R, p = (replace(f, error=f.error + x) for f, x in zip(functions, reversed(left), strict=True))
@@ -133,27 +136,28 @@ class Pair:
 
     def rests(self, name: str) -> Rests:
         """Both lines of a frame from their first difference on."""
-        start, a, b = self._start, self.a[name], self.b[name]
+        start, a, b = self._start(name), self.a[name], self.b[name]
         if start.deviation is None:
             return Rests(_rest(a, 0, None), _rest(b, 0, None), 0.0)
         chord = carried(start.deviation, reaches(a, self.ranges))[1]
         return Rests(_rest(a, start.depth, start.deviation.E), _rest(b, start.depth, identity()), chord)
 
-    def _finished(self, line: Line, begin: Matrix | None) -> tuple[Terms, Terms]:
+    def _finished(self, line: Line, depth: int, begin: Matrix | None, key: tuple[Motion | None, ...]) -> tuple[Terms, Terms]:
         """The terms of a line, rotation and origin, from its start on.
 
+        depth: how many joints are left out.
         begin: the constant there, in place of the joints before it; None if none is left out.
+        key: the first joints that are not left out, of both lines: what is multiplied out depends on them.
         """
-        depth = self._start.depth
         polynomial = Polynomial.one(self.scales)
         for motion in line.motions[depth:]:
-            if motion not in self._known:
+            if (motion, key) not in self._known:
                 known = polynomial.copy()
                 first = motion.depth == depth and begin is not None
                 known.then(Step(T=begin if first else motion.before))
                 known.then(motion.step)
-                self._known[motion] = known
-            polynomial = self._known[motion]
+                self._known[motion, key] = known
+            polynomial = self._known[motion, key]
         end = polynomial.copy()
         end.then(Step(T=line.tail))
         return end.finished()
@@ -167,16 +171,25 @@ class Pair:
         """A configuration at which nothing in particular happens, (n,)."""
         return np.asarray(self.ranges.mean(axis=1))
 
+    def inside(self, q: Array) -> Array:
+        """q (n,) with every joint that has a range moved into it."""
+        low, high = self.ranges.T
+        return np.asarray(np.where(low < high, np.clip(q, low, high), q))
+
     def _some(self, count: int) -> list[Array]:
         rng = np.random.default_rng(0)
-        turns = math.pi * np.array(self.scales)
+        turns = math.pi * np.array(self.scales, dtype=np.float64)
         slides = np.array([self._slides(j) for j in range(len(turns))], dtype=bool)
         low, high = np.where(slides, self.ranges[:, 0], -turns), np.where(slides, self.ranges[:, 1], turns)
         return list(rng.uniform(low, high, (count, len(turns))))
 
     def _slides(self, joint: int) -> bool:
-        motions = {m for lines in (self.a, self.b) for line in lines.values() for m in line.motions}
-        return any(m.row[joint] and not m.turns for m in motions)
+        return joint in {j for lines in (self.a, self.b) for line in lines.values() for j in sliding(line)}
+
+
+def sliding(line: Line) -> set[int]:
+    """The joints that slide something on a line, whatever else they do."""
+    return {j for motion in line.motions if not motion.turns for j, factor in enumerate(motion.row) if factor}
 
 
 def _rest(line: Line, depth: int, begin: Matrix | None) -> Path:

@@ -7,6 +7,7 @@ docs/theory.md has the proofs.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
@@ -18,7 +19,7 @@ from harness.theorem.balls import PRECISION, precision
 from harness.theorem.chain import Chains
 from harness.theorem.coefficients import Coefficients
 from harness.theorem.lower import At
-from harness.theorem.pair import Pair
+from harness.theorem.pair import Pair, sliding
 from harness.theorem.rotation import rotation_difference
 from harness.theorem.sharp import Top, highest, random_starts, sharpened
 
@@ -65,16 +66,27 @@ class Effort:
 def prove(a: Chains, b: Chains, ranges: Array, effort: Effort | None = None, bits: int = PRECISION) -> dict[str, FrameBound]:
     """Bounds on the discrepancy of two descriptions at each frame that both have.
 
+    A frame is left out if a joint slides something before it and has no range, or if its chains have too many terms.
+
     Args:
         a: one description.
         b: the other, with the same joints.
-        ranges: lower and upper end of each joint, (n, 2) [m]; only those of joints that slide count.
+        ranges: lower and upper end of each joint, (n, 2) [m]; only those of joints that slide something
+            count, and all others are equal ends.
         effort: how hard to look for a sharp bound.
         bits: precision of the balls.
     """
     with precision(bits):
         pair = Pair.of(a, b, np.asarray(ranges, dtype=float))
-        return {name: _frame(pair, name, effort or Effort()) for name in pair.names}
+        names = [name for name in pair.names if _is_bounded(pair, name)]
+        proven = {name: _frame(pair, name, effort or Effort()) for name in names}
+        return {name: bound for name, bound in proven.items() if math.isfinite(bound.position + bound.rotation)}
+
+
+def _is_bounded(pair: Pair, name: str) -> bool:
+    """Whether every joint that slides something on the way to a frame has a range."""
+    slides = sliding(pair.a[name]) | sliding(pair.b[name])
+    return all(pair.ranges[j, 0] < pair.ranges[j, 1] for j in slides)
 
 
 @dataclass(frozen=True)
@@ -108,17 +120,25 @@ def _frame(pair: Pair, name: str, effort: Effort) -> FrameBound:
         parts = [part if part.is_exact else _better(part, f) for part, f in zip(parts, functions, strict=True)]
         if effort.nodes:
             parts = [_sharp(pair, name, part, f, effort) for part, f in zip(parts, (functions[0], None), strict=True)]
-    seen += [(q, At(q).seen(pair.a[name], pair.b[name])) for q in (part.found.q for part in parts)]
+    seen += [(q, At(q).seen(pair.a[name], pair.b[name])) for q in (pair.inside(part.found.q) for part in parts)]
     best = [max(seen, key=lambda entry, i=i: entry[1][i]) for i in range(2)]  # type: ignore[misc]
+    if best[0][1].position > parts[0].upper or best[1][1].chord > parts[1].upper:
+        raise ArithmeticError(f"a bound at {name!r} lies below what was found")  # a fault of the proof: never told as proven
     return FrameBound(
         position=parts[0].upper,
         rotation=float(chord_angle(np.array(parts[1].upper))),
         position_found=best[0][1].position,
         rotation_found=float(chord_angle(np.array(best[1][1].chord))),
-        slope=0.0 if constant[0] else functions[0].slope() if functions else pair.slope(name),
+        slope=_slope(pair, name, functions),
         method=parts[0].method,
         worst=np.stack([q for q, _ in best]),
     )
+
+
+def _slope(pair: Pair, name: str, functions: tuple[Coefficients, Coefficients] | None) -> float | None:
+    """By constants where both have the same joints, which leaves nothing out; else from the coefficients."""
+    by_joints = pair.slope(name)
+    return by_joints if by_joints is not None else functions and functions[0].slope()
 
 
 def _better(part: _Part, function: Coefficients) -> _Part:

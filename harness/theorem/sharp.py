@@ -62,19 +62,19 @@ def highest(function: Coefficients, starts: Array) -> Top:
 def _tries(function: Coefficients, q: Array, joint: int, width: float) -> Array:
     """Values of one joint to look at: around the one it has, by up to so much of a period or of its range."""
     low, high = function.ranges[joint]
-    if (function.linear == joint).any():
+    if low < high or (function.linear == joint).any():
         return np.clip(np.linspace(q[joint] - width * (high - low), q[joint] + width * (high - low), POINTS), low, high)
     turn = 2.0 * math.pi * function.scales[joint]
     return np.asarray(q[joint] + np.linspace(-width * turn, width * turn, POINTS))
 
 
 def random_starts(function: Coefficients) -> Array:
-    """Configurations to climb from, (S, n), the same for the same function. What is no turn stays within its range."""
+    """Configurations to climb from, (S, n), the same for the same function. A joint that has a range stays in it."""
     rng = np.random.default_rng(0)
-    turns = np.asarray(function.frequencies.any(axis=0))
-    low = np.where(turns, 0.0, function.ranges[:, 0])
-    high = np.where(turns, 2.0 * math.pi * np.array(function.scales), function.ranges[:, 1])
-    return np.asarray(rng.uniform(low, high, (STARTS, len(turns))))
+    free = function.ranges[:, 0] == function.ranges[:, 1]  # a joint that slides nothing has no range
+    low = np.where(free, 0.0, function.ranges[:, 0])
+    high = np.where(free, 2.0 * math.pi * np.array(function.scales), function.ranges[:, 1])
+    return np.asarray(rng.uniform(low, high, (STARTS, len(free))))
 
 
 def sharpened(function: Coefficients, top: Top, most: int) -> tuple[float, Top]:
@@ -146,12 +146,13 @@ def _without_small(function: Coefficients, allowed: float) -> Coefficients:
 def _axes(function: Coefficients, most: int) -> list[_Axis] | None:
     """The joints of the grid, with so many nodes that the growth is the target, or as many as there may be.
 
-    None if a joint both turns and slides, or if there are too many joints.
+    None if a joint both turns and has a range, or if there are too many joints.
     """
     n = len(function.scales)
     degrees = [int(np.abs(function.frequencies[:, j]).max(initial=0)) for j in range(n)]
     slides = [bool((function.linear == j).any()) for j in range(n)]
-    if any(d and s for d, s in zip(degrees, slides, strict=True)):
+    held = function.ranges[:, 0] < function.ranges[:, 1]
+    if any(degrees[j] and (slides[j] or held[j]) for j in range(n)):
         return None
     turning = sum(d > 0 for d in degrees)
 

@@ -42,7 +42,7 @@ class Theorem:
     @property
     def is_equal(self) -> bool:
         """Whether both are the same function at every frame."""
-        return all(word == "equal" for word in self.equality.values())
+        return bool(self.frames) and all(word == "equal" for word in self.equality.values())
 
     @property
     def rotation(self) -> float:

@@ -67,6 +67,7 @@ def changes(found: Difference) -> dict[tuple[str, str], float]:
 def test_the_same_is_proven_for_all_configurations() -> None:
     found = diff(operand("ur5"), operand(UR5, "base", "tool0"), TOLERANCE)
     assert found.same
+    assert found.bound is not None
     assert found.largest.position <= found.bound.position < 1e-10
 
 

@@ -18,6 +18,7 @@ from harness.description.model import RobotModel, load_model
 from harness.description.urdf_file import parse_urdf
 from harness.difference.operands import of_urdf as operand_of_urdf
 from harness.kinematics.descriptions import of_table as mechanism_of_table
+from harness.run.proving import slides_of
 from harness.se3 import Array, chord_angle
 from harness.theorem.balls import precision
 from harness.theorem.chain import Chains
@@ -39,8 +40,9 @@ def chains(table: DHTable) -> Chains:
 
 
 def ranges(table: DHTable) -> Array:
-    """Half a metre or so for every joint; only those of slides count."""
-    return np.tile([-SLIDE, SLIDE], (len(table.joints), 1))
+    """Half a metre or so for every slide, none for joints that turn. (n, 2)."""
+    reach = np.array([SLIDE * (table.kind(joint) == "prismatic") for joint in table.joints])
+    return np.stack([-reach, reach], axis=1)
 
 
 def bound(a: DHTable, b: DHTable, effort: Effort = TIGHT) -> FrameBound:
@@ -58,7 +60,8 @@ def some_q(table: DHTable, rng: np.random.Generator, count: int) -> Array:
 def of_model_bounds(model: RobotModel, effort: Effort = TIGHT) -> dict[str, FrameBound]:
     """What is proven of a robot model's two descriptions."""
     both = of_model(model, {})
-    limits = np.stack([model.configurations.lower, model.configurations.upper], axis=1)
+    slides = slides_of(model)
+    limits = np.array([slides.get(joint, (0.0, 0.0)) for joint in model.table.joints])
     return prove(both["dh"], both["urdf"], limits, effort)
 
 
@@ -242,7 +245,7 @@ def test_a_urdf_with_oblique_axes_and_a_follower() -> None:
             polynomial.then(step)
         R, p = polynomial.finished()
     q = np.random.default_rng(0).uniform(-6, 6, (20, 2))
-    limits = np.tile([-6.0, 6.0], (2, 1))
+    limits = np.array([[0.0, 0.0], [-6.0, 6.0]])
     assert of_terms(p, scales, limits).values(q) == pytest.approx(placements(q)[:, :3, 3], abs=1e-13)
     assert of_terms(R, scales, limits).values(q) == pytest.approx(placements(q)[:, :3, :3].reshape(-1, 9), abs=1e-13)
 
@@ -258,7 +261,7 @@ def test_a_urdf_with_oblique_axes_and_a_follower() -> None:
 def test_urdfs_that_differ(old: str, new: str, position: float) -> None:
     a, _ = urdf_chains(OBLIQUE)
     b, _ = urdf_chains(OBLIQUE.replace(old, new, 1))
-    limits = np.tile([-1.0, 1.0], (2, 1))
+    limits = np.array([[0.0, 0.0], [-1.0, 1.0]])
     proven = prove(a, b, limits, TIGHT)["end"]
     assert proven.position_found <= proven.position
     assert proven.position == pytest.approx(position, rel=0.11, abs=1e-30)
@@ -279,3 +282,57 @@ def test_a_longer_d1_in_a_model(copy_model: Callable[..., Path]) -> None:
     tool = of_model_bounds(model)["tool0"]
     assert tool.position == pytest.approx(0.301e-3, rel=1e-7)
     assert tool.position_found == pytest.approx(0.301e-3, rel=1e-7)
+
+
+SCREW = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
+<joint name="one" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/><limit lower="-1" upper="1"/></joint>
+<joint name="two" type="prismatic"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/><limit lower="-1" upper="1"/>
+<mimic joint="one" multiplier="0.1"/></joint></robot>"""
+
+
+def test_a_screw_is_bounded_in_a_range_alone() -> None:
+    """A joint that turns and slides: its slide grows with every turn, so there is no bound without a range."""
+    a, _ = urdf_chains(SCREW)
+    b, _ = urdf_chains(SCREW.replace('multiplier="0.1"', 'multiplier="0.2"'))
+    assert prove(a, b, np.zeros((1, 2)), TIGHT) == {}
+    proven = prove(a, b, np.array([[-3.0, 2.0]]), TIGHT)["end"]
+    assert proven.position == pytest.approx(0.3, rel=1e-6)
+    assert proven.position_found == pytest.approx(0.3, rel=1e-6)
+    assert proven.slope == pytest.approx(0.1, rel=1e-6)
+
+
+def side_branch(angle: str) -> Chains:
+    """A trunk of three joints, and a frame beside it, after two that follow them with another geometry."""
+    text = f"""<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/><link name="e"/><link name="f"/>
+<joint name="j1" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/><limit lower="-1" upper="1"/></joint>
+<joint name="j2" type="revolute"><parent link="b"/><child link="c"/><origin xyz="0.3 0 0"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="1"/></joint>
+<joint name="j3" type="revolute"><parent link="c"/><child link="d"/><origin xyz="0.3 0 0"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="1"/></joint>
+<joint name="m1" type="revolute"><parent link="a"/><child link="e"/><origin xyz="0 0.2 0" rpy="{angle} 0 0"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1"/><mimic joint="j1"/></joint>
+<joint name="m2" type="revolute"><parent link="e"/><child link="f"/><origin xyz="0.4 0 0"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="1"/><mimic joint="j2"/></joint></robot>"""
+    urdf = parse_urdf(text.encode(), Path("text"))
+    operand = operand_of_urdf(urdf, "a", "d")
+    recipe = operand.recipe(operand.joints, {j: j for j in operand.joints}, False)
+    frames = {"trunk": ("d", ()), "side": ("f", posed((0.1, 0.0, 0.2), (0.0, 0.0, 0.0)))}
+    return of_urdf(urdf, "a", frames, recipe.joints, operand.joints)  # type: ignore[union-attr]
+
+
+def test_a_frame_beside_the_trunk_has_a_start_of_its_own() -> None:
+    proven = prove(side_branch("0"), side_branch("0.05"), np.zeros((3, 2)), TIGHT)
+    assert proven["trunk"].position < 1e-30
+    side = proven["side"]
+    assert 0.01 < side.position_found <= side.position <= 1.1 * side.position_found
+    assert 0.03 < side.rotation_found <= side.rotation
+
+
+def test_a_factor_of_twenty_digits_is_no_fault() -> None:
+    """Equal ones cancel; others beat against each other, so that whole turns are apart somewhere."""
+    digits = "0.12345678901234567891"
+    a, _ = urdf_chains(OBLIQUE.replace("-0.5", digits))
+    b, _ = urdf_chains(OBLIQUE.replace("-0.5", digits[:-1] + "2"))
+    limits = np.array([[0.0, 0.0], [-1.0, 1.0]])
+    assert prove(a, a, limits, TIGHT)["end"].position < 1e-30
+    assert prove(a, b, limits, TIGHT) == {}
