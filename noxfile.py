@@ -1,6 +1,6 @@
 """Every step of CI, to be run at home.
 
-`nox -s crosscheck`, `tests`, `browser`, `mutate`, `engines`, `cpp`, `matrix`, `lint`, `types`, `bench`, `guards`,
+`nox -s crosscheck`, `tests`, `fuzz`, `browser`, `mutate`, `engines`, `cpp`, `matrix`, `lint`, `types`, `bench`, `guards`,
 `audit`, `lock`.
 
 What a session installs is in a lock file of its own, `locks/SESSION.txt`, with the hash of every file; `nox -s lock` writes
@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import secrets
 import shutil
 import subprocess
 import sys
@@ -95,9 +96,21 @@ def crosscheck(session: nox.Session) -> None:
 
 @nox.session
 def tests(session: nox.Session) -> None:
-    """The test suite on this Python with the newest pin."""
+    """The test suite on this Python with the newest pin, a process a core; a file's tests share one, and its workers."""
     install(session, "tests", editable=True)
-    session.run("pytest", *session.posargs)
+    session.run("pytest", "--numprocesses", "auto", "--dist", "loadfile", *session.posargs)
+
+
+@nox.session
+def fuzz(session: nox.Session) -> None:
+    """Damaged model folders, URDFs and reports, 3 500 each, through the command. The seed is printed, and can be given again.
+
+    `nox -s fuzz -- --hypothesis-seed=1` for one that is known; FUZZ=200 for another number of each.
+    """
+    install(session, "tests", editable=True)
+    # Other inputs each time: `tests` has 200 of each, always the same.
+    seed = [] if any("seed" in word for word in session.posargs) else [f"--hypothesis-seed={secrets.randbelow(2**32)}"]
+    session.run("pytest", "-q", "tests/fuzz", *seed, *session.posargs, env={"CROSSCHECK_FUZZ": os.environ.get("FUZZ", "3500")})
 
 
 @nox.session

@@ -1,4 +1,4 @@
-"""derive-dh on every chain, root to leaf, of every URDF in example-robot-data: a table with a certificate, or the reason why not.
+"""derive-dh on every chain, root to leaf, of every URDF in example-robot-data: a table and a proof for both, or the reason.
 
 Prints what was not reproduced, file by file, and a count. Exits 1 if a chain is neither reproduced nor refused with a reason.
 """
@@ -21,7 +21,7 @@ SOURCE = "urdf:pinocchio"
 
 
 def one_file(path: Path) -> list[tuple[str, str, str, float]]:
-    """(chain, outcome, reason, certified bound) of each chain of one file."""
+    """(chain, outcome, reason, proven bound) of each chain of one file."""
     try:
         urdf = read_urdf(path)
         check(urdf)
@@ -62,7 +62,7 @@ def main() -> int:
                 if outcome == "refused":
                     reasons[" ".join(word for word in reason.split() if not word.startswith("'"))[:70]] += 1
     print(f"{len(files)} files: " + ", ".join(f"{n} {outcome}" for outcome, n in counts.items()))
-    print(f"largest certified bound of those reproduced: {largest:.1e} m")
+    print(f"largest proven bound of those reproduced: {largest:.1e} m")
     for reason, n in reasons.most_common():
         print(f"  {n} refused: {reason}")
     return 1 if counts["BROKEN"] or counts["NOT REPRODUCED"] else 0

@@ -135,7 +135,7 @@ def crosscheck(
     samples: random configurations, besides the fixed ones.
     seed: their seed.
     reference: the source that the others are compared with.
-    certify: prove a bound for all configurations.
+    certify: prove how far the table and the URDF can be apart, and test each engine against its own description.
     explain: look for the cause of each disagreement.
     options: everything else that can be asked; the arguments above then take the place of its fields.
 

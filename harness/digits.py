@@ -2,7 +2,8 @@
 
 Rounding errors of a placement are about 1e-16 m, and which ones they are depends on the processor. `harness.kernels` tells the
 libraries to do the same on all of them; a library that cannot be told, or was imported before, does not. So a number is written
-to what it means: a discrepancy by `discrepancy`, a proven bound by `upper_bound`, a coordinate by `coordinate`. The types of
+to what it means: a discrepancy by `discrepancy`, a proven bound by `upper_bound`, what is proven to occur by `lower_bound`, a
+coordinate by `coordinate`. The types of
 the report document do it. Of configurations whose discrepancies are written alike, the first is the worst one.
 
 A number that lies between two written ones may still become either: see docs/theory.md.
@@ -21,6 +22,7 @@ from harness.se3 import Array
 DECIMALS = (14, 13, 6)
 CHANGES = (1e-12, 3.0)
 COORDINATE = 12  # decimals of a coordinate, an angle, a parameter
+MEASURED = 1e-13
 ANCHOR = 10  # decimals of a placement beside which another one stands
 
 
@@ -35,10 +37,34 @@ def as_fine_as(x: float, largest: float) -> float:
 
 
 def upper_bound(x: float) -> float:
-    """An upper bound [m or rad], x >= 0, to as many decimals as a discrepancy, and not below it: it stays a bound."""
-    decimals = DECIMALS[bisect(CHANGES, x)]
-    written = round(x, decimals)
-    return written if written >= x else round(written + 10.0**-decimals, decimals)
+    """A proven bound [m or rad], x >= 0, to nine significant digits, upwards: it stays a bound."""
+    return _significant(x, 9, up=True)
+
+
+def lower_bound(x: float) -> float:
+    """A discrepancy that is proven to occur [m or rad], x >= 0, to six significant digits, downwards."""
+    return _significant(x, 6, up=False)
+
+
+def measured_bounds(lower: float, upper: float) -> tuple[float, float]:
+    """Both of a frame whose offset an engine has measured, to 1e-13 outwards: the offset is not known better."""
+    low, high = (round(f(x / MEASURED) * MEASURED, 13) for f, x in ((math.floor, lower), (math.ceil, upper)))
+    return low, high
+
+
+def _significant(x: float, digits: int, up: bool) -> float:
+    if not 1e-290 < x < math.inf:
+        return x
+    exponent = digits - 1 - math.floor(math.log10(x))
+    written = float(f"{x:.{digits - 1}e}")
+    if (written < x) if up else (written > x):
+        written = float(f"{written + (1 if up else -1) * 10.0**-exponent:.{digits - 1}e}")
+    return written
+
+
+def first_of_largest(values: Array) -> int:
+    """Index of the first of the largest values (N,): those that differ from the largest by less than 1e-9 of it count as it."""
+    return int(np.argmax(values >= values.max() * (1.0 - 1e-9)))
 
 
 def coordinate(x: float) -> float:
@@ -53,7 +79,7 @@ def anchored(reference: float, other: float) -> tuple[float, float]:
     """
     written, apart = round(reference, ANCHOR) + 0.0, other - reference
     there = written + (discrepancy(apart) if apart >= 0.0 else -discrepancy(-apart))
-    return (written, round(there, DECIMALS[0]) + 0.0) if math.isfinite(there) else (reference, other)
+    return written, round(there, DECIMALS[0]) + 0.0
 
 
 def steps(values: Array) -> Array:

@@ -23,7 +23,7 @@ LINKED = ("README.md", "CONTRIBUTING.md", *(f"docs/{name}.md" for name in ("api"
 TERMS = (
     "source", "engine", "reference", "mapped frame", "rigid frame", "gauge", "residual", "noise floor", "gate", "certificate",
     "trait", "description", "placement", "discrepancy", "twist", "tolerance", "accepted deviation", "published placement",
-    "worker", "configuration", "base and tool", "canonical parameters", "mutant",
+    "worker", "configuration", "base and tool", "canonical parameters", "mutant", "theorem",
 )  # fmt: skip
 
 

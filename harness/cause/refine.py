@@ -39,7 +39,7 @@ def derivatives(state: State, wanted: Sequence[Knob]) -> Array:
         slots = [mechanism.parameters.index(k.parameter) for k in own]
         J = fit.derivatives(T, xi[slots], moves[slots]).reshape(len(own), -1)
         rows.update(zip(own, J if end == "a" else -J, strict=True))
-    return np.array([rows[k] for k in wanted])
+    return np.array([rows[k] for k in wanted]).reshape(len(wanted), 6 * len(q) * len(names))
 
 
 def gap(state: State) -> Array:

@@ -123,8 +123,18 @@ def _text(outlet: Outlet, old: TextIO | None, errors: str) -> TextIO:
     )
 
 
+# What changes more than its own letter on a terminal: delete, C1 controls, line separators, marks that turn the direction.
+_CONTROL = "[\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]"
+
+
 def json_line(text: str) -> str:
-    """JSON for standard output: where that is not UTF-8, every character beyond ASCII as an escape of JSON."""
-    if (sys.stdout.encoding or "").lower().replace("-", "") == "utf8":
-        return text
-    return re.sub(r"[^\x00-\x7f]", lambda match: json.dumps(match[0])[1:-1], text)
+    """JSON for standard output, with escapes of JSON for control characters.
+
+    Where standard output is not UTF-8, every character beyond ASCII is an escape.
+    """
+    utf8 = (sys.stdout.encoding or "").lower().replace("-", "") == "utf8"
+    return re.sub(_CONTROL if utf8 else r"[^\x00-\x7e]", lambda match: _escape(match[0]), text)
+
+
+def _escape(letter: str) -> str:
+    return r"\u007f" if letter == "\x7f" else json.dumps(letter)[1:-1]

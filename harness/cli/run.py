@@ -140,7 +140,12 @@ class RunSettings:
     help="Source that the others are compared with.",
 )
 @click.option("--samples", type=int, default=2000, show_default=True, help="Random configurations, besides the fixed ones.")
-@click.option("--certify/--no-certify", default=True, show_default=True, help="Prove a bound for all configurations.")
+@click.option(
+    "--certify/--no-certify",
+    default=True,
+    show_default=True,
+    help="Prove how far the two files can be apart, and test each engine against its own.",
+)
 @click.option("--explain/--no-explain", default=True, show_default=True, help="Look for the cause of each disagreement.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random configurations.")
 @click.option(

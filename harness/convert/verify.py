@@ -1,4 +1,4 @@
-"""Proves a derived DH table: the robot model made of it is cross-checked against the URDF that it came from."""
+"""Checks a derived DH table: the robot model made of it is cross-checked against the URDF that it came from."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SAMPLES = 200
 
 
 def verify(derived: Derived, name: str, source: str, out: Path | None) -> Report:
-    """Write the robot model, read it back and cross-check it, with a certificate.
+    """Write the robot model, read it back and cross-check it, with a proof for its two files.
 
     derived: the table and the chain that it was found from.
     name: name of the robot model, and of its folder.

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from harness.convert.result import Derived
 from harness.description.dh import DHTable
+from harness.description.joints import is_range
 from harness.description.tidy import angle_text, is_identity, number_text, transform_toml
 from harness.errors import InputError
 from harness.se3 import Array
@@ -104,10 +105,10 @@ def _frames_toml(derived: Derived) -> str:
 
 
 def _configurations_toml(derived: Derived) -> str:
-    """Ranges for prismatic joints that the URDF gives none."""
+    """Ranges for prismatic joints that the URDF gives none, or numbers that mean none."""
     lines = []
     for row in derived.table.rows:
         limits = derived.urdf.joints[row.name].limits
-        if row.kind == "prismatic" and (limits is None or not limits[0] < limits[1]):
+        if row.kind == "prismatic" and (limits is None or not is_range(limits, slides=True)):
             lines.append(f"{_quoted(row.name)} = [-1, 1]")
     return "[random.limits]\n" + "\n".join(lines) + "\n" if lines else ""

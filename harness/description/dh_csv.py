@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast, get_args
@@ -23,6 +24,7 @@ from harness.errors import ModelFileError, nearest
 from harness.reading import MODEL_BYTES, read_text
 
 MAX_ROWS = 1000
+FAR = 100.0  # [m]: no arm is as long
 
 
 @dataclass(frozen=True)
@@ -118,9 +120,17 @@ def _row(header: list[str], cells: list[str], path: Path, line: int, suspects: l
             numbers[column] = parse_number(text.get(column) or "0", largest, unit)
         except ValueError as error:
             raise ModelFileError(str(error), where=path, line=line, key=f"column {column!r}") from None
+        if column in ("a", "d") and abs(numbers[column]) > FAR:
+            suspects.append(SuspectNumber(f"{path.name}:{line}: {text['joint']} {column}", _far(text[column], numbers[column])))
         if column in ("alpha", "theta") and (why := _suspect_angle(text.get(column, ""), numbers[column])):
             suspects.append(SuspectNumber(f"{path.name}:{line}: {text['joint']} {column}", why))
     return DHRow(name=text["joint"], kind=cast(Kind, kind), **numbers)
+
+
+def _far(text: str, value: float) -> str:
+    """What an enormous length means."""
+    why = "axes that are nearly parallel make lengths enormous and ill-determined, only what is left of their sum counts"
+    return f"{text} m: {why}; float64 resolves {math.ulp(value):.1e} m of it"
 
 
 def _suspect_angle(text: str, value: float) -> str | None:

@@ -12,10 +12,12 @@ import numpy as np
 from harness.description.dh import DHTable
 from harness.description.frames import FrameMap
 from harness.description.frames_file import JointEntry
-from harness.description.urdf import MOVABLE, UNSUPPORTED, Urdf, UrdfJoint
+from harness.description.urdf import MOVABLE, NO_LIMIT, UNSUPPORTED, Urdf, UrdfJoint
 from harness.description.values import LARGEST_ANGLE, LARGEST_LENGTH, checked_angle
 from harness.errors import MappingError, UrdfError, nearest
 from harness.se3 import Array
+
+TRAVEL = 10.0  # [m]: how far a slide is looked at whose limits mean none
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -260,12 +262,21 @@ def random_limits(table: DHTable, urdf: Urdf | None, joint_map: JointMap | None)
         for row, joint_name in enumerate(joint_map.names):
             joint, a = urdf.joints[joint_name], joint_map.A[row]
             alone = single[row] and abs(a[i]) == 1.0 and joint.mimic is None
-            if alone and joint.type != "continuous" and joint.limits and _is_range(joint.limits, joint.type == "prismatic"):
+            if alone and joint.type != "continuous" and joint.limits and is_range(joint.limits, joint.type == "prismatic"):
                 ends = sorted((limit - joint_map.b[row]) / a[i] for limit in joint.limits)
-                ranges[name] = (float(ends[0]), float(ends[1]))
+                slides = joint.type == "prismatic"
+                ranges[name] = _sane(float(ends[0]), float(ends[1])) if slides else (float(ends[0]), float(ends[1]))
     return ranges
 
 
-def _is_range(limits: tuple[float, float], slides: bool) -> bool:
+def _sane(lower: float, upper: float) -> tuple[float, float]:
+    """The range of a slide; an end that means none, such as 999999 m, is taken as 10 m from where the other one lets it begin."""
+    nearest = min(max(0.0, lower), upper)
+    low = lower if abs(lower) < NO_LIMIT else max(lower, nearest - TRAVEL)
+    high = upper if abs(upper) < NO_LIMIT else min(upper, nearest + TRAVEL)
+    return low, high
+
+
+def is_range(limits: tuple[float, float], slides: bool) -> bool:
     """Whether configurations can be drawn between two limits [m if it slides, else rad]."""
     return limits[0] < limits[1] and max(map(abs, limits)) <= (LARGEST_LENGTH if slides else LARGEST_ANGLE)

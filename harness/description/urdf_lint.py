@@ -35,7 +35,7 @@ def check(urdf: Urdf) -> tuple[Finding, ...]:
     errors = [f for f in findings if f.level == "error"]
     if errors:
         more = f" (and {len(errors) - 1} more errors)" if len(errors) > 1 else ""
-        raise UrdfError(f"{errors[0].message}{more}", where=urdf.path, line=errors[0].line, key=errors[0].code)
+        raise UrdfError(f"{errors[0].message}{more}", where=urdf.path, line=errors[0].line or None, key=errors[0].code)
     return findings
 
 

@@ -116,7 +116,9 @@ class Difference:
         if self.theorem.is_equal:
             return Line(plain(f"{word} {self.a.label} and {self.b.label}: equal at every configuration (proven)"), kind)
         seen = f"up to {metres(self.largest.position)}, {radians(self.largest.rotation)} apart"
-        proven = f"for all q at most {metres(self.bound.position)}, {radians(self.bound.rotation)} (proven)"
+        slides = [f"{joint} from {low:g} to {high:g} m" for joint, (low, high) in self.theorem.ranges.items()]
+        where = f"for all q{' with ' if slides else ''}{', '.join(slides)}"
+        proven = f"{where} at most {metres(self.bound.position)}, {radians(self.bound.rotation)} (proven)"
         return Line(plain(f"{word} {self.a.label} and {self.b.label}: {seen}; {proven}"), kind)
 
     def reasons(self) -> Iterator[Line]:

@@ -83,6 +83,7 @@ class Engine(ABC):
         isolated: whether it runs in a process of its own.
         resolution: what its arithmetic is good for, [m] and [rad], if that is worse than float64. It is the tolerance of an
             engine that model.toml does not list.
+        slow: a configuration takes it a millisecond or more, and it answers one after the other: it is tested at fewer.
         ignored_step: joint steps up to this may leave its answers as they were, as one of its traits says [rad or m].
         requirements: what pip installs for it.
         debian: packages of the system's own Python that it needs instead.
@@ -97,6 +98,7 @@ class Engine(ABC):
     partial: bool = False
     isolated: ClassVar[bool] = True
     resolution: ClassVar[float] = 0.0
+    slow: ClassVar[bool] = False
     ignored_step: ClassVar[float] = 0.0
     requirements: ClassVar[tuple[str, ...]] = ()
     debian: ClassVar[tuple[str, ...]] = ()

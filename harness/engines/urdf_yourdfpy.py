@@ -19,6 +19,7 @@ class UrdfYourdfpy(Engine):
 
     source = "urdf:yourdfpy"
     requirements = ("yourdfpy>=0.0.56",)
+    slow = True
     ignored_step = 1e-8
     traits = (
         Trait(

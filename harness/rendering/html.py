@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
+from functools import cache
 from typing import NamedTuple
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -15,13 +16,14 @@ from markupsafe import escape
 from harness.rendering import scripts
 from harness.rendering.figures import apart, distribution, skeletons
 from harness.rendering.markdown import render_markdown
-from harness.report.document import PairResult, Report, Source
+from harness.report.document import Frame, Report, Source
 from harness.report.explanation import Explanation
 from harness.report.model_parts import Link, ParameterPair
-from harness.report.proven import for_all, proven_text
+from harness.report.proven import at_most, for_all
+from harness.report.results import PairResult
 from harness.report.sentences import change_of, changed_text, difference, moved_text
 from harness.report.source_parts import FrameResult
-from harness.report.tested import further_out, own_description
+from harness.report.tested import all_tested, further_out, own_description
 from harness.report.text import degrees, metres, numbers, pasteable, plain, point, quantity, radians
 from harness.report.verdicts import Verdict
 
@@ -38,6 +40,7 @@ class Cell(NamedTuple):
     anchor: str
 
 
+@cache  # it keeps the compiled templates: to compile one takes longer than to fill it
 def _environment() -> Environment:
     env = Environment(
         loader=PackageLoader("harness.rendering", "templates"),
@@ -68,11 +71,13 @@ def render_html(report: Report) -> str:
         pairs=_numbered(report),
         frames=[frame.name for frame in report.frames],
         by_frame={s.name: {f.frame: f for f in s.frames} for s in report.sources},
+        mapped=_by_dh(report),
         anchors={s.name: f"source-{i}" for i, s in enumerate(report.sources)},
         failing=failing(report),
         causes=_causes(report),
         misfiled=[p for p in report.published if p.found == "wrong" and p.status == "holds"],
-        proven=proven_text(report.theorem, [b.frame for b in report.theorem.frames]) if report.theorem else "",
+        proven=at_most(report.theorem) if report.theorem and report.theorem.frames else "",
+        all_tested=all_tested(report.sources),
         blind={frame.name for frame in report.frames if frame.relation == "rigid"},
         side_by_side=_side_by_side(report),
         certified=[s for s in report.sources if s.certificate],
@@ -179,6 +184,14 @@ def _side_by_side(report: Report) -> list[tuple[str, list[str], list[tuple[str, 
         heads = [f"{p.parameter} [{'mm' if p.unit == 'm' else 'deg'}]" for p in chosen[0][1]] if chosen else []
         tables.append((title, heads, chosen))
     return [table for table in tables if table[2]]
+
+
+def _by_dh(report: Report) -> dict[str, list[Frame]]:
+    """The mapped frames on each DH frame, by its label."""
+    mapped: dict[str, list[Frame]] = {}
+    for frame in report.frames:
+        mapped.setdefault(frame.dh, []).append(frame)
+    return mapped
 
 
 def _tree(report: Report) -> list[tuple[int, Link]]:

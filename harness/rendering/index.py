@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from harness.errors import InputError
@@ -50,7 +51,7 @@ def write_index(folder: Path, tell: Callable[[str], None] = to_stderr) -> Path:
     try:
         # Under one lock: of two runs at once, the last to write has seen the reports of both.
         with locked(folder):
-            put(folder / SCHEMA_NAME, json.dumps(schema(), indent=2) + "\n")
+            put(folder / SCHEMA_NAME, _schema_text())
             reports, left_out = _reports(folder)
             without_page = {r.robot.name for r in reports if not (folder / f"{r.robot.name}.html").is_file()}
             put(path, render_index(reports, [str(one) for one in left_out], without_page))
@@ -60,6 +61,11 @@ def write_index(folder: Path, tell: Callable[[str], None] = to_stderr) -> Path:
         more = f", and {len(left_out) - TOLD} more" if len(left_out) > TOLD else ""
         tell(f"note: not listed in {path}: {', '.join(str(one) for one in left_out[:TOLD])}{more}")
     return path
+
+
+@cache
+def _schema_text() -> str:
+    return json.dumps(schema(), indent=2) + "\n"
 
 
 def _reports(folder: Path) -> tuple[list[Report], list[LeftOut]]:

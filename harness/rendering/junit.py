@@ -2,40 +2,50 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
+from harness.errors import shortened
 from harness.report.document import Report, Source
-from harness.report.published_part import PublishedResult
 from harness.report.regression import Regression
+from harness.report.results import PublishedResult
 from harness.report.sentences import why, worsened
 from harness.report.source_parts import FrameResult
 from harness.report.tested_parts import Tested
 from harness.report.text import metres, numbers, pasteable, plain, radians
 from harness.report.verdicts import Verdict
 
+LONGEST = 4000  # letters of what all failing frames of a source say
+
 
 def render_junit(report: Report) -> str:
     """The report as JUnit XML text."""
     suite = TestSuite(plain(report.robot.name))
-    for source in report.sources:
-        if source.reference and source.passes:
-            continue
-        if source.status != "ran":
-            suite.add_testcase(_not_run(report, source))
-        for frame in source.frames:
-            suite.add_testcase(_frame(report, source, frame))
-        if source.verdict in (Verdict.INVALID_PLACEMENTS, Verdict.KEEPS_STATE):
-            suite.add_testcase(_invalid(report, source))
-        elif source.tested and source.tested.problem:
-            suite.add_testcase(_own_description(report, source, source.tested))
-    for claim in report.published:
-        suite.add_testcase(_published(report, claim))
-    if report.regression is not None and report.regression.strict:
-        suite.add_testcase(_regression(report, report.regression))
+    suite.add_testcases(list(_cases(report)))  # all at once: each addition counts them anew
     xml = JUnitXml()
     xml.add_testsuite(suite)
     xml.update_statistics()  # type: ignore[no-untyped-call]
     return bytes(xml.tostring()).decode()  # type: ignore[no-untyped-call]
+
+
+def _cases(report: Report) -> Iterator[TestCase]:
+    for source in report.sources:
+        if source.reference and source.passes:
+            continue
+        if source.status != "ran":
+            yield _not_run(report, source)
+        cause = _cause(report, source)
+        for frame in source.frames:
+            yield _frame(report, source, frame, cause)
+        if source.verdict in (Verdict.INVALID_PLACEMENTS, Verdict.KEEPS_STATE):
+            yield _invalid(report, source)
+        elif source.tested and source.tested.problem:
+            yield _own_description(report, source, source.tested)
+    for claim in report.published:
+        yield _published(report, claim)
+    if report.regression is not None and report.regression.strict:
+        yield _regression(report, report.regression)
 
 
 def _case(report: Report, name: str, group: str) -> TestCase:
@@ -49,7 +59,18 @@ def _not_run(report: Report, source: Source) -> TestCase:
     return case
 
 
-def _frame(report: Report, source: Source, frame: FrameResult) -> TestCase:
+def _cause(report: Report, source: Source) -> str:
+    """What every failing frame of a source says of it: a reproducer, why, the command. Cut short, as it stands there so often."""
+    lines = []
+    if source.reproducer:
+        r = source.reproducer
+        lines.append(f"smallest reproducer, frame {r.frame}: q = {numbers(r.q, 17)}, {metres(r.position)}, {radians(r.rotation)}")
+    lines += [f"why: {text.strip()}" for text in why(source)]
+    lines.append(pasteable(report.settings.command))
+    return shortened("\n".join(plain(line) for line in lines), LONGEST)
+
+
+def _frame(report: Report, source: Source, frame: FrameResult, cause: str) -> TestCase:
     case = _case(report, frame.frame, source.name)
     if frame.passes:
         return case
@@ -59,11 +80,7 @@ def _frame(report: Report, source: Source, frame: FrameResult) -> TestCase:
     lines = [f"tolerance {metres(source.tolerance.position)}, {radians(source.tolerance.rotation)}"]
     if frame.position.worst:
         lines.append(f"worst position at {frame.position.worst.label}: q = {numbers(frame.position.worst.q, 17)}")
-    if source.reproducer:
-        r = source.reproducer
-        lines.append(f"smallest reproducer, frame {r.frame}: q = {numbers(r.q, 17)}, {metres(r.position)}, {radians(r.rotation)}")
-    lines += [f"why: {text.strip()}" for text in why(source)]
-    failure.text = "\n".join(plain(line) for line in [*lines, pasteable(report.settings.command)])
+    failure.text = "\n".join([*map(plain, lines), cause])
     case.result = [failure]
     return case
 

@@ -13,7 +13,7 @@ from harness.report.verdicts import Verdict
 
 _ENTITY = {"<": "&lt;", ">": "&gt;", "&": "&amp;"}
 # A screenful, whatever the report holds: at most 60 lines.
-SOURCES, CAUSES, OTHERS = 18, 12, 4
+SOURCES, CAUSES, OTHERS = 18, 8, 4
 
 
 def render_markdown(report: Report) -> str:

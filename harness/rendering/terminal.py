@@ -75,7 +75,7 @@ def _since(report: Report, console: Console) -> None:
 
 def _tested(report: Report, console: Console) -> None:
     """Each engine against its own description: one line for all that compute what it says, and one a source for what else is."""
-    if text := all_tested(report.sources):
+    if (text := all_tested(report.sources)) and text not in report.verdict.sentence:
         console.print(Text(plain(f"  {text}")))
     for source in report.sources:
         for text in further_out(source):

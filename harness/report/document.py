@@ -7,25 +7,42 @@ do that, see `harness.digits`.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
+from harness.digits import coordinate
 from harness.report.explanation import Explanation
 from harness.report.model_parts import SideBySide, Trees
 from harness.report.notebook import html_lines, html_table, text_table
-from harness.report.parts import Configuration, Count, Discrepancy, Finite, Matrix, NonNegative, Part, Reach, RobotName
+from harness.report.parts import (
+    Configuration,
+    Count,
+    Finite,
+    Matrix,
+    NonNegative,
+    Part,
+    RobotName,
+)
 from harness.report.pose import Pose
 from harness.report.proof_parts import Certificate, Theorem
-from harness.report.published_part import PublishedResult
 from harness.report.regression import Regression
+from harness.report.results import Lint, PairResult, PublishedResult
 from harness.report.source_parts import FrameResult, Reproducer, Tolerance, TraitNote, Validity
 from harness.report.tested_parts import Tested
 from harness.report.text import metres, plain, radians
 from harness.report.verdicts import SourceVerdict
 
 WORDS = {0: "PASS", 1: "FAIL", 3: "INCOMPLETE"}
+
+
+def _require_different(names: Iterable[str], what: str) -> None:
+    """Raise ValueError if two are the same."""
+    counts = Counter(names)
+    if (twice := next((name for name, count in counts.items() if count > 1), None)) is not None:
+        raise ValueError(f"it has {counts[twice]} {what} called {twice!r}")
 
 
 def _require(names: Iterable[str], known: set[str], what: str) -> None:
@@ -110,7 +127,7 @@ class Source(Part):
 
 
 class Frame(Part):
-    """One mapped frame. `offset` is T_dh_frame: declared, or if rigid the mean over all configurations (a lattice of 1021)."""
+    """One mapped frame. `offset` is T_dh_frame: declared, or if rigid the mean over a lattice of 1021 configurations."""
 
     name: str
     dh: str
@@ -119,26 +136,6 @@ class Frame(Part):
     of: str | None = None
     offset: Matrix | None = None
     measured_from: str = ""
-
-
-class PairResult(Part):
-    """Largest discrepancies of two sources over the subset of configurations."""
-
-    a: str
-    b: str
-    position: Discrepancy
-    position_frame: str
-    rotation: Discrepancy
-    rotation_frame: str
-
-
-class Lint(Part):
-    """A finding about the URDF, the table or the mapping."""
-
-    code: str
-    level: Literal["error", "warning", "note"]
-    subject: str
-    message: str
 
 
 class Robot(Part):
@@ -152,7 +149,7 @@ class Robot(Part):
     joints: list[str]
     lower: list[Finite]
     upper: list[Finite]
-    reach: Reach
+    reach: Annotated[NonNegative, AfterValidator(coordinate)]
     hashes: dict[str, str]
 
     @model_validator(mode="after")
@@ -164,8 +161,9 @@ class Robot(Part):
 
 class Settings(Part):
     """What was asked for. `not_chosen`: sources of model.toml that the command line left out. `gate`: what decides, the
-    configurations sampled or the certificate. `fixed` and `samples` count configurations, `subset` those on which all pairs
-    are compared. `probe_seed`: of the configurations at which each engine was tested against its own description."""
+    configurations sampled, or also what is proven of the two descriptions. `fixed` and `samples` count configurations,
+    `subset` those on which all pairs are compared. `probe_seed`: of the configurations at which each engine was tested
+    against its own description."""
 
     reference: str
     sources: list[str]
@@ -238,6 +236,8 @@ class Report(Part):
     @model_validator(mode="after")
     def _speaks_of_what_it_has(self) -> Report:
         """What renders a document looks things up by name. What is not there is refused here, in one line."""
+        _require_different((s.name for s in self.sources), "sources")
+        _require_different((f.name for f in self.frames), "frames")
         sources, frames = {s.name for s in self.sources}, {f.name for f in self.frames}
         _require((name for pair in self.pairs for name in (pair.a, pair.b)), sources, "source")
         _require((place for source in self.sources for place in source.places()), frames, "frame")

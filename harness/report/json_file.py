@@ -15,6 +15,13 @@ from harness.report.document import Report
 FORMAT = Report.model_fields["format"].default
 VERSION = Report.model_fields["version"].default
 
+# How many a report may have of what every format goes through, some of them each with each.
+MOST_SOURCES = 200
+MOST_FRAMES = 1000  # mapped frames
+MOST_RESULTS = 50_000  # frames of all sources together
+MOST_JOINTS = 1000
+LONGEST_NAME = 1000  # letters of what stands in many places: the name of a source, of a frame
+
 
 def schema() -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of the document, generated from the types."""
@@ -53,4 +60,21 @@ def report_of(text: str, path: Path) -> Report:
         key = ".".join(str(step) for step in first["loc"])
         problem = first["msg"].removeprefix("Value error, ")
         raise InputError(f"not a report: {problem}", where=path, key=key or None) from None
+    _require_bounded(report, path)
     return report
+
+
+def _require_bounded(report: Report, path: Path) -> None:
+    """Refuse what would make a page that is many times as large as its report."""
+    results = sum(len(source.frames) for source in report.sources)
+    for count, most, what in (
+        (len(report.sources), MOST_SOURCES, "sources"),
+        (len(report.frames), MOST_FRAMES, "frames"),
+        (results, MOST_RESULTS, "frames of all sources together"),
+        (len(report.robot.joints), MOST_JOINTS, "joints"),
+    ):
+        if count > most:
+            raise InputError(f"expected at most {most} {what}, got {count}", where=path)
+    names = [report.settings.reference, *(s.name for s in report.sources), *(f.name for f in report.frames)]
+    if (longest := max(map(len, names))) > LONGEST_NAME:
+        raise InputError(f"expected names of at most {LONGEST_NAME} letters, got one of {longest}", where=path)

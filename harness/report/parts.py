@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from harness.digits import anchored, coordinate, discrepancy, upper_bound
+from harness.digits import anchored, coordinate, discrepancy, lower_bound, upper_bound
 from harness.writing import LONGEST_ROBOT_NAME, RESERVED, ROBOT_NAME
 
 
@@ -20,8 +20,8 @@ def _not_reserved(name: str) -> str:
 # Computed numbers, written to the digits that mean something.
 Discrepancy = Annotated[float, Field(ge=0, allow_inf_nan=False), AfterValidator(discrepancy)]
 UpperBound = Annotated[float, Field(ge=0, allow_inf_nan=False), AfterValidator(upper_bound)]
+LowerBound = Annotated[float, Field(ge=0, allow_inf_nan=False), AfterValidator(lower_bound)]
 Coordinate = Annotated[float, Field(allow_inf_nan=False), AfterValidator(coordinate)]
-Reach = Annotated[float, Field(ge=0, allow_inf_nan=False), AfterValidator(coordinate)]
 
 # Numbers as somebody has written them, and those that are exact.
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -32,7 +32,6 @@ Vector = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 Rotation = Annotated[list[Vector], Field(min_length=3, max_length=3)]
 _Row = Annotated[list[Coordinate], Field(min_length=4, max_length=4)]
 Matrix = Annotated[list[_Row], Field(min_length=4, max_length=4)]
-Angles = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 _FineRow = Annotated[list[Finite], Field(min_length=4, max_length=4)]
 FineMatrix = Annotated[list[_FineRow], Field(min_length=4, max_length=4)]  # one of two that stand side by side
 

@@ -26,8 +26,16 @@ def proven_text(theorem: Theorem, frames: Collection[str]) -> str:
     return f"{apart}, by the digits of pi alone" if words <= {"equal", "equal but for the digits of pi"} else apart
 
 
+def at_most(theorem: Theorem) -> str:
+    """`table and URDF at most 1.2e-11 m, 8.2e-11 rad apart`, at any frame; or that they are equal."""
+    if theorem.is_equal:
+        return "table and URDF are equal"
+    position, rotation = (max(getattr(b, f"{what}_upper") for b in theorem.frames) for what in ("position", "rotation"))
+    return f"table and URDF at most {metres(position)}, {radians(rotation)} apart"
+
+
 def _slides(theorem: Theorem) -> str:
-    ranges = [f"{joint} from {metres(r.lower)} to {metres(r.upper)}" for joint, r in theorem.slides.items()]
+    ranges = [f"{joint} from {r.lower:g} to {r.upper:g} m" for joint, r in theorem.slides.items()]
     return f" with {', '.join(ranges)}" if ranges else ""
 
 

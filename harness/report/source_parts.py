@@ -1,4 +1,4 @@
-"""What a report says of one source: statistics, tolerances, placements checked, certificate.
+"""What a report says of one source: statistics, tolerances, placements checked.
 
 Units are metres and radians.
 """

@@ -1,1 +1,1 @@
-"""One cross-check: plan, load, bind, stream, certify, explain."""
+"""One cross-check: plan, load, bind, compare, explain, prove, test."""

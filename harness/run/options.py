@@ -25,7 +25,7 @@ class Options:
     sources: the sources to compare, which are then required; empty: those of model.toml.
     reference: the source that the others are compared with.
     command: shown in the report as how to reproduce it.
-    certify: prove a bound for all configurations.
+    certify: prove how far the table and the URDF can be apart at every configuration.
     explain: look for the cause of each disagreement.
     all_engines: compare also every engine that model.toml does not list.
     workers: (name, command) of programs that speak the worker protocol.

@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias
 
 from harness.cause.explain import Explanation
 from harness.comparison.compare import Comparison
+from harness.description.dh import DHTable
 from harness.description.model import RobotModel
 from harness.errors import EngineFailed, EngineUnavailable
 from harness.run.binding import Bound
@@ -119,6 +120,15 @@ class Outcome:
         self.install = (error.install or "") if isinstance(error, EngineUnavailable) else ""
 
 
+def rounding_needed(table: DHTable) -> float:
+    """What two right evaluations of a table in float64 may differ by [m]: 4 (n + 2) u (1 + sum |a| + |d|).
+
+    Of an arm of ordinary lengths that is some 1e-14 m. Nearly parallel axes give a and d of kilometres that cancel.
+    """
+    lengths = sum(abs(row.a) + abs(row.d) for row in table.rows)
+    return 4.0 * (len(table.rows) + 2) * 2.0**-53 * (1.0 + lengths)
+
+
 @dataclass(kw_only=True)
 class Run:
     """One robot model cross-checked.
@@ -163,8 +173,9 @@ class Run:
         return transforms(self.offsets)
 
     def tolerance(self, outcome: Outcome) -> tuple[float, float]:
-        """Tolerance [m], [rad] of a source against the reference."""
-        return pair_tolerance(outcome.planned, self.reference.planned)
+        """Tolerance [m], [rad] of a source against the reference. Not below what float64 needs for lengths that cancel."""
+        position, rotation = pair_tolerance(outcome.planned, self.reference.planned)
+        return max(position, rounding_needed(self.model.table)), rotation
 
     def take_out(self, outcome: Outcome, error: Exception, where: str = "") -> None:
         """Take out a source that failed after it was compared.

@@ -31,6 +31,7 @@ TURNS = 25  # each way, of the far ones
 TRAVEL = 10.0  # [m] each way: how far a slide goes that has no sane range
 STREAM = 1 << 62  # the random configurations of a run take the streams from 0 on
 MOST_JOINTS = 16  # that are looked at one by one
+SLOW_BLOCK = MAX_BLOCK // 2  # rows of the full block of a slow engine
 WINDOWS = 2048  # rows of the grids over neighbouring joints, where the whole grid is too large
 
 SUBSET, FAR_ROWS, COMBINED = 256, 256, 48
@@ -141,19 +142,22 @@ class Probes:
     singles: Block
 
 
-def draw(model: RobotModel, compared: Array, seed: int) -> Probes:
+def draw(model: RobotModel, compared: Array, seed: int, rows: int = MAX_BLOCK) -> Probes:
     """The probes of a model.
 
     compared: configurations that the comparison has asked, (N, n) [rad or m].
     seed: below 2^64.
+    rows: of the full block. With fewer than a block can have, the grid is thinned out.
     """
     box, draws = Box.of(model.configurations), Draws(seed)
     special, far, walk = _special(box, draws), _far(box, draws), _steps(box, draws)
     nodes = _grid(model, box, draws)
+    if rows < MAX_BLOCK:
+        nodes = nodes[_spread(len(nodes), rows // 3)]
     parts = [(SPECIAL, special), (STEPS, np.unique(walk, axis=0)), (FAR, far), (GRID, nodes)]
-    apart = sum(len(rows) for _, rows in parts) > MAX_BLOCK * 3 // 4  # then the grid is a block of its own
+    apart = sum(len(rows) for _, rows in parts) > rows * 3 // 4  # then the grid is a block of its own
     first = parts[:-1] if apart else parts
-    full = _block([*first, (FULL, box.uniform(draws, MAX_BLOCK - sum(len(rows) for _, rows in first)))])
+    full = _block([*first, (FULL, box.uniform(draws, rows - sum(len(rows) for _, rows in first)))])
     square = Block(full.q[-full.q.shape[1] :], (AGAIN,) * full.q.shape[1])  # rows taken for columns show only here
     blocks = [_block([(COMPARED, compared)]), full, *([_block([(GRID, nodes)])] if apart else []), square]
     return Probes(box, tuple(blocks), _singles(box, draws, full, (special, far, walk)))

@@ -14,13 +14,14 @@ from harness.engines.registry import adapter_of, kind_of
 from harness.run.binding import Bound
 from harness.run.described import Described, described
 from harness.run.outcome import Certified, Outcome, Run
-from harness.run.probes import AGAIN, SUBSET, Block, Box, Mask, Probes, draw
+from harness.run.probes import AGAIN, SLOW_BLOCK, SUBSET, Block, Box, Mask, Probes, draw
 from harness.run.seen import Answers, Seen
 from harness.run.streaming import total_of
 from harness.run.tested import Tested
 from harness.se3 import Array
 from harness.workers.pool import Workers
 from harness.workers.process import ProcessEngine
+from harness.workers.protocol import MAX_BLOCK
 
 CELLS = 20_000  # placements compared at a time
 ALONE, LATER = "alone", "looked at later, after others were asked for"
@@ -39,13 +40,14 @@ def probe_all(run: Run, workers: Workers) -> None:
     """Test every source that runs. One that raises where it must answer is taken out, as in the comparison."""
     configurations = run.model.configurations
     compared = configurations.block(run.options.seed, 0, min(SUBSET, total_of(run)))
-    probes = draw(run.model, compared, run.options.probe_seed)
     descriptions = {kind: described(run.model, kind, run.rigid_transforms) for kind in ("dh", "urdf")}
     names = [frame.name for frame in run.model.frames.frames]
-    running = [o for o in run.outcomes if o.bound is not None]
+    running = [o for o in run.outcomes if o.bound is not None and o.bound.view.available]
+    sizes = {o.name: SLOW_BLOCK if _is_slow(o) else MAX_BLOCK for o in running}
+    probes = {rows: draw(run.model, compared, run.options.probe_seed, rows) for rows in {*sizes.values()}}
     tasks: list[tuple[Outcome, Future[Tested]]] = []
     for outcome in sorted(running, key=lambda o: -o.running().seconds):  # what begins last decides when all are done
-        trial = _Trial(outcome, descriptions[kind_of(outcome.name)], names, probes)
+        trial = _Trial(outcome, descriptions[kind_of(outcome.name)], names, probes[sizes[outcome.name]])
         tasks.append((outcome, workers.submit(trial.tested)))
     for outcome, task in tasks:
         try:
@@ -54,6 +56,11 @@ def probe_all(run: Run, workers: Workers) -> None:
             run.take_out(outcome, failure.error, f"(tested against its own description: {failure.kind})")
     for outcome in run.compared:
         _withdraw(run, outcome)
+
+
+def _is_slow(outcome: Outcome) -> bool:
+    """Whether its adapter says so; a program of the user's has none."""
+    return not outcome.planned.command and adapter_of(outcome.name).slow
 
 
 def _withdraw(run: Run, outcome: Outcome) -> None:

@@ -84,7 +84,7 @@ def run_robot(
 
 
 def _drop_dead(run: Run) -> None:
-    """A worker that crashed or hung after the comparison, while being certified, has failed like any other."""
+    """A worker that crashed or hung after the comparison, while it was tested, has failed like any other."""
     for outcome in run.outcomes:
         engine = outcome.bound.engine if outcome.bound else None
         if isinstance(engine, ProcessEngine) and engine.died:

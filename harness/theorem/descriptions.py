@@ -1,7 +1,7 @@
 """DH tables, URDFs and robot models as chains with exact numbers.
 
 A URDF is read as its specification says; see `harness.kinematics.descriptions`. Angles of model.toml and frames.toml that are
-the float64 next to a multiple of pi/12 are that multiple (`harness.description.written.angle_of`).
+the float64 next to a multiple of pi/12, pi/16 or a degree are that multiple (`harness.description.written.angle_of`).
 """
 
 from __future__ import annotations

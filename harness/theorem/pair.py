@@ -88,6 +88,17 @@ class Pair:
         constant = tuple(y <= 1e-6 * x or (x == 0.0 and y == 0.0) for x, y in zip(own, left, strict=True))
         return (bounds[0], bounds[1]), (constant[0], constant[1])
 
+    def slope(self, name: str) -> float | None:
+        """Upper bound on how fast the position's discrepancy grows with the slides, by constants alone [m/m]."""
+        end, slope, chord = self.deviation(name), 0.0, 0.0
+        if end is None:
+            return None
+        for motion, residual in zip(self.a[name].motions, end.residuals, strict=True):
+            chord += residual.chord
+            if not motion.turns:
+                slope += chord / math.sqrt(2.0) * float(sum(abs(x) for x in motion.row))
+        return slope * (1.0 + 1e-12)
+
     @cached_property
     def _start(self) -> Start:
         """How many joints from the base drop out: what they leave behind is a small share of the largest bound."""

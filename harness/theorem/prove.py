@@ -20,11 +20,11 @@ from harness.theorem.coefficients import Coefficients
 from harness.theorem.lower import At
 from harness.theorem.pair import Pair
 from harness.theorem.rotation import rotation_difference
-from harness.theorem.sharp import Top, highest, is_more, random_starts, sharpened
+from harness.theorem.sharp import Top, highest, random_starts, sharpened
 
 Method: TypeAlias = Literal["constant", "joints", "coefficients", "grid"]
 
-RATIO = 1.1
+RATIO, EXACT = 1.1, 1.001
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,8 +34,8 @@ class FrameBound:
     Attributes:
         position, rotation: no configuration has a larger discrepancy [m], [rad].
         position_found, rotation_found: some configuration has at least this one; evaluated in ball arithmetic.
-        slope: by how much the position's discrepancy can grow with each metre of slide, within the range or beyond [m/m]; None if
-            only constants were looked at.
+        slope: by how much the position's discrepancy can grow with each metre of slide, within the range or beyond [m/m];
+            None for chains of many joints that are not the same.
         method: how the position's bound was found; `constant` if the discrepancy is the same at every configuration.
         worst: the configurations of the two, (2, n) [rad or m].
     """
@@ -86,6 +86,11 @@ class _Part:
     method: Method
 
     @property
+    def is_exact(self) -> bool:
+        """Whether the bound is what was found, to a thousandth."""
+        return self.method == "constant" or self.upper <= EXACT * self.found.value
+
+    @property
     def is_sharp(self) -> bool:
         """Whether the bound is no more than a tenth above what was found."""
         return self.method == "constant" or self.upper <= RATIO * self.found.value
@@ -98,9 +103,9 @@ def _frame(pair: Pair, name: str, effort: Effort) -> FrameBound:
     for i in range(2):
         q, largest = max(seen, key=lambda entry, i=i: entry[1][i])  # type: ignore[misc]
         parts.append(_Part(rough[i], Top(largest[i], q), "constant" if constant[i] else "joints"))
-    functions = None if all(part.is_sharp for part in parts) else pair.multiplied_out(name)
+    functions = None if all(part.is_exact for part in parts) else pair.multiplied_out(name)
     if functions is not None:
-        parts = [part if part.is_sharp else _better(part, f) for part, f in zip(parts, functions, strict=True)]
+        parts = [part if part.is_exact else _better(part, f) for part, f in zip(parts, functions, strict=True)]
         if effort.nodes:
             parts = [_sharp(pair, name, part, f, effort) for part, f in zip(parts, (functions[0], None), strict=True)]
     seen += [(q, At(q).seen(pair.a[name], pair.b[name])) for q in (part.found.q for part in parts)]
@@ -110,7 +115,7 @@ def _frame(pair: Pair, name: str, effort: Effort) -> FrameBound:
         rotation=float(chord_angle(np.array(parts[1].upper))),
         position_found=best[0][1].position,
         rotation_found=float(chord_angle(np.array(best[1][1].chord))),
-        slope=0.0 if constant[0] else functions and functions[0].slope(),
+        slope=0.0 if constant[0] else functions[0].slope() if functions else pair.slope(name),
         method=parts[0].method,
         worst=np.stack([q for q, _ in best]),
     )
@@ -118,8 +123,7 @@ def _frame(pair: Pair, name: str, effort: Effort) -> FrameBound:
 
 def _better(part: _Part, function: Coefficients) -> _Part:
     """With the bound that the coefficients give, and the largest value that climbing finds."""
-    climbed = highest(function, random_starts(function))
-    top = climbed if is_more(climbed.value, part.found.value) else part.found
+    top = max(part.found, highest(function, random_starts(function)), key=lambda t: t.value)
     bound = function.bound()
     return _Part(bound, top, "coefficients") if bound < part.upper else replace(part, found=top)
 

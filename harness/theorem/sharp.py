@@ -16,6 +16,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from harness.digits import first_of_largest
 from harness.se3 import Array
 from harness.theorem.coefficients import ROUNDING, Coefficients
 
@@ -24,7 +25,6 @@ TARGET = 1.085  # growth between the nodes that is aimed at
 FINEST = 64  # nodes a degree
 STARTS = 32
 POINTS = 129
-SAME = 1e-9  # values that are nearer to each other, relative to their size, are equal
 WIDTHS = (1.0, 0.5, 0.02, 0.02, 0.002, 0.0005)  # of a period, each way
 
 Complex: TypeAlias = NDArray[np.complex128]
@@ -38,16 +38,6 @@ class Top:
     q: Array
 
 
-def first_largest(values: Array) -> int:
-    """The index of the first of values (N,) that is as large as the largest, but for rounding."""
-    return int(np.argmax(values >= values.max() * (1.0 - SAME)))
-
-
-def is_more(value: float, best: float) -> bool:
-    """Whether a value is larger by more than rounding: where a function is flat, that would choose the configuration."""
-    return value > best + SAME * abs(best)
-
-
 def highest(function: Coefficients, starts: Array) -> Top:
     """Climb from the best of some configurations to a local maximum, joint by joint.
 
@@ -58,16 +48,14 @@ def highest(function: Coefficients, starts: Array) -> Top:
         starts: configurations (S, n) [rad or m].
     """
     norms = np.linalg.norm(function.values(starts), axis=1)
-    first = first_largest(norms)
-    q, best = starts[first].copy(), float(norms[first])
+    q, best = starts[first_of_largest(norms)].copy(), float(norms.max())
     moving = [j for j in range(starts.shape[1]) if function.frequencies[:, j].any() or (function.linear == j).any()]
     for width in WIDTHS:
         for j in moving:
             tries = _tries(function, q, j, width)
             norms = np.linalg.norm(function.along(q, j, tries), axis=1)
-            if is_more(float(norms.max()), best):
-                first = first_largest(norms)
-                q[j], best = tries[first], float(norms[first])
+            if norms.max() > best * (1.0 + 1e-9):  # less is a matter of rounding
+                q[j], best = tries[first_of_largest(norms)], float(norms.max())
     return Top(best, q)
 
 
@@ -112,7 +100,7 @@ def sharpened(function: Coefficients, top: Top, most: int) -> tuple[float, Top]:
         starts[0, axis.joint] = axis.nodes[index]
     climbed = highest(function, starts)
     bound = (size * growth + ROUNDING * plain) * (1.0 + ROUNDING) + reduced.error
-    return min(plain, bound), climbed if is_more(climbed.value, top.value) else top
+    return min(plain, bound), max(top, climbed, key=lambda t: t.value)
 
 
 @dataclass(frozen=True)
@@ -190,14 +178,14 @@ def _largest_on(function: Coefficients, axes: list[_Axis]) -> tuple[float, tuple
     """The largest norm on the grid, and at which node of each axis it is. One axis is walked, to bound the memory."""
     if not axes:
         return float(np.linalg.norm(function.real.sum(axis=0))), ()
-    best, where = -1.0, (0,) * len(axes)
+    top, best, where = 0.0, 0.0, (0,) * len(axes)
     for first, values in _slices(function, axes):
         squares = np.einsum("d...,d...->...", values, values)
-        size = float(squares.max())
-        if is_more(size, best):
-            where = (first, *(int(i) for i in np.unravel_index(first_largest(squares.ravel()), squares.shape)))
-        best = max(best, size)
-    return math.sqrt(best), where
+        index = first_of_largest(squares.ravel())
+        size, top = float(squares.flat[index]), max(top, float(squares.max()))
+        if size > best * (1.0 + 1e-9):
+            best, where = size, (first, *(int(i) for i in np.unravel_index(index, squares.shape)))
+    return math.sqrt(top), where
 
 
 def _slices(function: Coefficients, axes: list[_Axis]) -> Iterator[tuple[int, Array]]:

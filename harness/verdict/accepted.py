@@ -17,8 +17,8 @@ from harness.errors import InputError, command_line
 from harness.reading import MODEL_BYTES, parsed_json, read_text
 from harness.report.document import GateVerdict, Report, Robot, Settings, Source
 from harness.report.parts import NonNegative, Part
-from harness.report.published_part import PublishedResult
 from harness.report.regression import Changed, Moved, Quantity, Regression
+from harness.report.results import PublishedResult
 
 FOLDER = "accepted"
 GATE = {0: "passes", 1: "fails", 3: "incomplete"}  # how the file calls the verdict

@@ -11,8 +11,8 @@ from harness.description.configurations import Configuration
 from harness.description.published import Published
 from harness.engines.lint_traits import messages
 from harness.report import document as doc
+from harness.report import results
 from harness.report.proof_parts import Theorem
-from harness.report.published_part import PublishedResult
 from harness.run.outcome import Run
 from harness.verdict.accepted import AcceptedNumbers, since
 from harness.verdict.evidence import theorem
@@ -30,7 +30,7 @@ class _Judged:
     robot: doc.Robot
     settings: doc.Settings
     sources: list[doc.Source]
-    published: list[PublishedResult]
+    published: list[results.PublishedResult]
     theorem: Theorem | None
     verdict: doc.GateVerdict
 
@@ -129,12 +129,12 @@ def _unmapped(run: Run) -> list[str]:
     return [f"DH frame {label}" for label in labels] + [f"link {link}" for link in links]
 
 
-def _pairs(run: Run) -> list[doc.PairResult]:
+def _pairs(run: Run) -> list[results.PairResult]:
     if run.comparison is None:
         return []
     names = [frame.name for frame in run.model.frames.frames]
     return [
-        doc.PairResult(
+        results.PairResult(
             a=a,
             b=b,
             position=pair.position,
@@ -146,12 +146,12 @@ def _pairs(run: Run) -> list[doc.PairResult]:
     ]
 
 
-def _published(run: Run, configuration: Configuration, claim: Published) -> PublishedResult:
+def _published(run: Run, configuration: Configuration, claim: Published) -> results.PublishedResult:
     """Check a claim against the in-house FK, whatever the reference of the run is."""
     T_base_a, T_base_b = run.in_house.engine.placements(configuration.q[None, :], (claim.relative_to, claim.dh))[0]
     T_a_b = se3.inverse(T_base_a) @ T_base_b
     check = check_claim(claim, T_a_b)
-    return PublishedResult(
+    return results.PublishedResult(
         configuration=configuration.name,
         frame=claim.dh,
         relative_to=claim.relative_to,
@@ -170,13 +170,13 @@ def _published(run: Run, configuration: Configuration, claim: Published) -> Publ
     )
 
 
-def _lint(run: Run) -> list[doc.Lint]:
+def _lint(run: Run) -> list[results.Lint]:
     found = [
-        doc.Lint(code=f.code, level=f.level, subject=f.subject, message=f"URDF line {f.line}: {message}")
+        results.Lint(code=f.code, level=f.level, subject=f.subject, message=f"URDF line {f.line}: {message}")
         for f, message in zip(run.model.findings, messages(run.model.findings), strict=True)
     ]
     found += [
-        doc.Lint(code="suspect-number", level="warning", subject=s.where, message=f"{s.where}: {s.why}")
+        results.Lint(code="suspect-number", level="warning", subject=s.where, message=f"{s.where}: {s.why}")
         for s in run.model.suspects
     ]
     return found

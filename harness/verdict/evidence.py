@@ -1,4 +1,4 @@
-"""What a report shows for a source's verdict: certificate, explanation, reproducer, and both sides where it is worst."""
+"""What a report shows for a source's verdict: what is proven of the files, why, reproducer, and both sides where it is worst."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ from typing import Any
 
 from harness.cause.changes import Change
 from harness.description.configurations import ConfigurationSet
+from harness.digits import measured_bounds
 from harness.report import explanation as reasons
 from harness.report import proof_parts as proofs
 from harness.report import source_parts as parts
 from harness.report.pose import FramePair, Pose
 from harness.run.outcome import Explained, Outcome, Run
 from harness.theorem.prove import FrameBound
+
+WORTH_TELLING = 1e-11  # [m]: where two descriptions differ by less is a matter of the last digits
 
 
 def at(configurations: ConfigurationSet, index: int, seed: int) -> parts.At:
@@ -25,7 +28,7 @@ def certificate(run: Run, outcome: Outcome) -> proofs.Certificate | None:
     if certified is None:
         return None
     pairs = zip(certified.frames, certified.bounds, strict=True) if certified.bounds else ()
-    frames = [_bound(run.model.frames.frames[index].name, bound) for index, bound in pairs]
+    frames = [_bound(run, run.model.frames.frames[index].name, bound) for index, bound in pairs]
     return proofs.Certificate(status="certified" if frames else "refused", reason=certified.reason, frames=frames)
 
 
@@ -34,20 +37,23 @@ def theorem(run: Run) -> proofs.Theorem | None:
     if run.theorem is None:
         return None
     return proofs.Theorem(
-        frames=[_bound(name, bound) for name, bound in run.theorem.frames.items()],
-        equality=dict(run.theorem.equality),
-        worst={name: bound.worst[0].tolist() for name, bound in run.theorem.frames.items()},
+        frames=[_bound(run, name, bound) for name, bound in run.theorem.frames.items()],
+        equality={n: "offset measured" if n in run.offsets else word for n, word in run.theorem.equality.items()},
+        worst={n: b.worst[0].tolist() for n, b in run.theorem.frames.items() if b.position_found > WORTH_TELLING},
         slides={joint: proofs.Range(lower=lower, upper=upper) for joint, (lower, upper) in run.theorem.ranges.items()},
     )
 
 
-def _bound(frame: str, bound: FrameBound) -> proofs.FrameBound:
+def _bound(run: Run, frame: str, bound: FrameBound) -> proofs.FrameBound:
+    position, rotation = (bound.position_found, bound.position), (bound.rotation_found, bound.rotation)
+    if frame in run.offsets:
+        position, rotation = measured_bounds(*position), measured_bounds(*rotation)
     return proofs.FrameBound(
         frame=frame,
-        position_upper=bound.position,
-        position_found=bound.position_found,
-        rotation_upper=bound.rotation,
-        rotation_found=bound.rotation_found,
+        position_upper=position[1],
+        position_found=position[0],
+        rotation_upper=rotation[1],
+        rotation_found=rotation[0],
         slope=bound.slope,
         method=bound.method,
     )

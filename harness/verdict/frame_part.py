@@ -24,7 +24,7 @@ class _Seen:
 
     frame: the mapped frame.
     position, rotation: statistics of its discrepancies [m], [rad].
-    proven: the bounds of its certificate there, if it has one.
+    proven: what is proven there of the descriptions that it and the reference read, if that counts.
     accepted: the deviation on file and its reason, if there is one.
     """
 
@@ -61,7 +61,7 @@ def _verdict(run: Run, outcome: Outcome, seen: _Seen) -> FrameVerdict:
     if not seen.position.count:
         return Verdict.NOT_COMPARED
     tolerance, bound = run.tolerance(outcome), seen.proven
-    # What the certificate's search has found counts like what the samples have shown: both were evaluated.
+    # What was found of the two descriptions counts like what the samples have shown: both were evaluated.
     position = max(seen.position.max, bound.position_found if bound else 0.0)
     rotation = max(seen.rotation.max, bound.rotation_found if bound else 0.0)
     verdict = judge(position, rotation, tolerance, seen.accepted[0] if seen.accepted else None)

@@ -6,11 +6,12 @@ from collections.abc import Iterable, Sequence
 
 from harness.errors import ExitCode
 from harness.report import document as doc
+from harness.report import results
 from harness.report.proof_parts import Theorem
 from harness.report.proven import proven_text
-from harness.report.published_part import PublishedResult
 from harness.report.regression import Regression
 from harness.report.sentences import worsened
+from harness.report.tested import all_tested
 from harness.report.text import metres, radians
 from harness.report.verdicts import Verdict
 from harness.se3 import REPEATED
@@ -29,7 +30,7 @@ def combined(codes: Iterable[int]) -> int:
 def gate(
     robot: str,
     sources: Sequence[doc.Source],
-    published: Sequence[PublishedResult],
+    published: Sequence[results.PublishedResult],
     settings: doc.Settings,
     theorem: Theorem | None,
 ) -> doc.GateVerdict:
@@ -58,6 +59,7 @@ def gate(
     if accepted:
         sentence += f", {accepted} deviations as accepted"
     sentence += _proven(compared, theorem)
+    sentence += f"; {text}" if (text := all_tested(sources)) else ""
     sentence += _asides(sources, settings)
     return doc.GateVerdict(exit_code=0, sentence=sentence)
 
@@ -94,7 +96,7 @@ def _proven(compared: list[doc.Source], theorem: Theorem | None) -> str:
     return f"; {text}{' (accepted deviations aside)' if aside else ''}" if text else ""
 
 
-def _misfiled(claims: list[PublishedResult]) -> str:
+def _misfiled(claims: list[results.PublishedResult]) -> str:
     first, more = claims[0], len(claims) - 1
     rotation = "" if first.rotation_error is None else f", {first.rotation_error:.2g} in the rotation"
     return (

@@ -18,7 +18,7 @@ from harness.verdict.judge import OwnVerdict
 
 HOW = {
     COMPARED: "at the configurations compared",
-    FULL: "in a block of 4096 configurations",
+    FULL: "in a full block",
     SINGLE: "for one configuration at a time",
     STEPS: "in small steps",
     AGAIN: "for one configuration again, coming from elsewhere",

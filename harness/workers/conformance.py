@@ -100,7 +100,7 @@ def _moving(engine: ProcessEngine, T: Array) -> str:
 
 def _beyond(engine: ProcessEngine, q: Array, turning: NDArray[np.bool_]) -> str:
     """A turn more must change nothing; a joint that slides is moved by a metre."""
-    reason = "forward kinematics has no limits, and the proof for all configurations needs it without"
+    reason = "forward kinematics has no limits, and a run tests it beyond them"
     near, far = engine.placements(q[:8], engine.frames), engine.placements(q[:8] + 2 * np.pi * turning, engine.frames)
     further = engine.placements(q[:8] + np.where(turning, -20 * np.pi, 1.0), engine.frames)
     if not (np.isfinite(far).all() and np.isfinite(further).all()):

@@ -84,3 +84,9 @@ def test_what_an_engine_adds_to_its_description_is_kept(models: dict[str, RobotM
         assert problem.unmodelled["a", part] is problem.unmodelled["a", part]
     with pytest.raises(KeyError):
         replace(problem, b=None).unmodelled["b", "fit"]
+
+
+def test_nothing_is_found_where_neither_side_has_a_model(models: dict[str, RobotModel]) -> None:
+    """As with a tolerance so small that no description reproduces its own engine."""
+    problem = replace(against_the_urdf(models["stanford"], (0, "d", 0.001)), a=None, b=None)
+    assert [strategy.name for strategy in STRATEGIES if strategy.find(State.start(problem)) is not None] == []

@@ -93,9 +93,17 @@ def test_json_in_an_encoding_that_lacks_letters(text: str) -> None:
         patch.setattr(sys, "stdout", io.TextIOWrapper(io.BytesIO(), encoding="latin-1"))
         line = json_line(json.dumps({"a": text}, ensure_ascii=False))
         patch.setattr(sys, "stdout", io.TextIOWrapper(io.BytesIO(), encoding="UTF-8"))
-        assert json_line(text) == text
+        whole = json_line(json.dumps({"a": text}, ensure_ascii=False))
     assert line.isascii()
-    assert json.loads(line) == {"a": text}
+    assert json.loads(line) == json.loads(whole) == {"a": text}
+
+
+def test_json_has_no_control_characters() -> None:
+    """A name in a report may be meant for the terminal that shows it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "stdout", io.TextIOWrapper(io.BytesIO(), encoding="UTF-8"))
+        line = json_line('{"a": "\x7f\x86\x9b31m\u2028\u202e\u2066é\U0001f916"}')
+    assert line == r'{"a": "\u007f\u0086\u009b31m\u2028\u202e\u2066é' + '\U0001f916"}'
 
 
 def shell(command: str, folder: Path, **env: str) -> tuple[int, str]:

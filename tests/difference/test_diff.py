@@ -315,3 +315,10 @@ def test_no_joint_at_all(tmp_path: Path) -> None:
     (tmp_path / "fixed.csv").write_text("joint,type,a,alpha,d,theta\nflange,fixed,0,0,0.1,0\n")
     with pytest.raises(InputError, match="every row is fixed"):
         operand(str(tmp_path / "fixed.csv"))
+
+
+def test_what_is_proven_names_the_range_of_slides() -> None:
+    rows = [DHRow.of("j1", "revolute", [0.3, 0.0, 0.0, 0.0]), DHRow.of("j2", "prismatic", [0.0, 0.0, 0.1, 0.0])]
+    longer = [DHRow.of("j1", "revolute", [0.301, 0.0, 0.0, 0.0]), rows[1]]
+    found = diff(of_table(DHTable(tuple(rows))), of_table(DHTable(tuple(longer))), TOLERANCE)
+    assert "for all q with j2 from -0.5 to 0.5 m at most 1.000 mm, 0 rad (proven)" in str(found)

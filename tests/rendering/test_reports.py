@@ -10,7 +10,7 @@ from typing import Any
 
 import jsonschema
 import pytest
-from junitparser import JUnitXml
+from junitparser import JUnitXml, TestSuite
 from lxml import html as lxml_html
 
 from harness.description.model import RobotModel, load_model
@@ -95,7 +95,7 @@ def test_html_says_what_the_document_says(reports: dict[str, Report], robot: str
         "Verdict", "For which configurations", "Who disagrees", "Where", "Why", "How sure", "What moved since it was accepted",
         "How to reproduce",
     ]  # fmt: skip
-    assert {"For all configurations: the certificate", "Canonical parameters side by side", "What did not run"} <= {
+    assert {"Proven: the two descriptions, at every configuration", "Canonical parameters side by side", "What did not run"} <= {
         h.text for h in page.iter("h3")
     }
     proof = report.sources[2].certificate
@@ -138,6 +138,27 @@ def test_junit_lists_what_failed(reports: dict[str, Report], disagreeing: Report
     assert "base" not in names
     texts = [case.result[0].text for suite in failed for case in suite if case.result and case.name == "tool0"]
     assert any("smallest reproducer" in text and "crosscheck run ur5" in text for text in texts)
+
+
+def test_junit_counts_its_cases_once(reports: dict[str, Report], monkeypatch: pytest.MonkeyPatch) -> None:
+    """To count them at each case takes minutes for some thousand."""
+    count: Any = TestSuite.update_statistics
+    counted = []
+
+    def counting(suite: TestSuite) -> None:
+        counted.append(suite)
+        count(suite)
+
+    monkeypatch.setattr(TestSuite, "update_statistics", counting)
+    render_junit(reports["ur5"])
+    assert 1 <= len(counted) <= 2
+
+
+def test_what_every_failing_frame_says_is_short_in_junit(disagreeing: Report) -> None:
+    """A long command, or cause, once in the document must not be a thousand times in the page."""
+    long = remade(disagreeing, settings=remade(disagreeing.settings, command=f"crosscheck run {'x' * 100_000}"))
+    assert len(render_junit(long)) < 100_000
+    assert "smallest reproducer" in render_junit(long)
 
 
 def test_index_lists_every_report_in_the_folder(reports: dict[str, Report], disagreeing: Report, tmp_path: Path) -> None:
@@ -329,7 +350,7 @@ def test_the_summary_of_a_job_is_the_markdown(
 
 def test_markdown_is_a_screenful_however_much_there_is(disagreeing: Report) -> None:
     many = [remade(disagreeing.sources[2], name=f"urdf:engine{i}") for i in range(40)]
-    out = [remade(s, status="not run", verdict="not run", frames=[], reason="x") for s in many]
+    out = [remade(s, name=f"{s.name}b", status="not run", verdict="not run", frames=[], reason="x") for s in many]
     report = remade(disagreeing, sources=[*disagreeing.sources, *many, *out], published=disagreeing.published * 9)
     report = compared(report, accepted_from(disagreeing), False)
     text = render_markdown(report)

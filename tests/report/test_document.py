@@ -38,6 +38,12 @@ def source(d: Document) -> Any:
     return next(s for s in d["sources"] if s["name"] == "urdf:pinocchio")
 
 
+def small(name: str) -> Document:
+    """A source that was compared nowhere."""
+    tolerance = {"position": 1.0, "rotation": 1.0}
+    return {"name": name, "required": False, "status": "ran", "verdict": "agrees", "tolerance": tolerance}
+
+
 HOSTILE_NAMES = (
     "../../x", "/abs/x", "a/b", "..", ".", "", ".hidden", "-x", "x\0y", "x\n", "x" * 129, "x" * 5000, "index", "INDEX",
     "report.schema", "ü", "a b", "con\\x", "x\u202e",
@@ -93,8 +99,12 @@ BROKEN: dict[str, tuple[Callable[[Document], object], str]] = {
         lambda d: source(d)["certificate"]["frames"][0].update(frame=""),
         "a frame that it does not have, ''",
     ),
+    "a frame of the theorem": (lambda d: d["theorem"]["frames"][0].update(frame="nowhere"), "of frames of the report"),
+    "an equality missing": (lambda d: d["theorem"]["equality"].popitem(), "of frames of the report"),
     "a certificate of nothing": (lambda d: source(d)["certificate"].update(frames=[]), "a bound of at least one frame"),
     "a source missing": (lambda d: d["sources"].pop(), "a source that it does not have"),
+    "a source twice": (lambda d: d["sources"].append(small(source(d)["name"])), "it has 2 sources called 'urdf:pinocchio'"),
+    "a frame twice": (lambda d: d["frames"].append(d["frames"][0]), "it has 2 frames called 'base'"),
     "a pair of nobody": (lambda d: d["pairs"][0].update(b="nobody"), "a source that it does not have, 'nobody'"),
     "limits missing": (lambda d: d["robot"]["lower"].pop(), "a lower and an upper limit of each of 6 joints"),
     "a joint more": (lambda d: d["robot"]["joints"].append("j"), "limit of each of 7 joints"),
@@ -109,6 +119,31 @@ BROKEN: dict[str, tuple[Callable[[Document], object], str]] = {
     "a decade of 400 digits": (lambda d: source(d)["frames"][0]["position"]["decades"].update({"1" * 400: 1}), "match pattern"),
     "counts below zero": (lambda d: source(d)["frames"][0]["position"].update(count=-1), "greater than or equal to 0"),
 }
+
+
+# A page has each source with each, and each frame of each source.
+TOO_MUCH: dict[str, tuple[Callable[[Document], object], str]] = {
+    "sources": (lambda d: d["sources"].extend(small(f"s{i}") for i in range(200)), "at most 200 sources, got 203"),
+    "frames": (
+        lambda d: d["frames"].extend({**d["frames"][0], "name": f"f{i}"} for i in range(1000)),
+        "at most 1000 frames, got",
+    ),
+    "results": (
+        lambda d: source(d)["frames"].extend(source(d)["frames"][:1] * 50_000),
+        "at most 50000 frames of all sources together, got 5",
+    ),
+    "joints": (
+        lambda d: [
+            d["robot"].update(joints=["j"] * 1001, lower=[0] * 1001, upper=[0] * 1001),
+            d.update(sources=[], pairs=[], theorem=None),
+        ],
+        "at most 1000 joints, got 1001",
+    ),
+    "letters of a source": (lambda d: d["sources"].append(small("x" * 1001)), "names of at most 1000 letters, got one of 1001"),
+    "letters of a frame": (lambda d: d["frames"].append({**d["frames"][0], "name": "x" * 1001}), "at most 1000 letters"),
+    "letters of the reference": (lambda d: d["settings"].update(reference="x" * 1001), "at most 1000 letters"),
+}
+BROKEN |= TOO_MUCH
 
 
 @pytest.mark.parametrize("kind", BROKEN)

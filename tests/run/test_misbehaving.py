@@ -216,3 +216,6 @@ def test_an_accepted_deviation_hides_nothing_else(models: dict[str, RobotModel],
     assert {str(f.verdict) for f in source.frames} == {"agrees", "accepted"}
     assert str(source.verdict) == "disagrees"
     assert own_test(source).problem.endswith("from where the URDF has it")
+    caught = own_test(source).caught
+    assert caught is not None
+    assert next(str(f.verdict) for f in source.frames if f.frame == caught.frame) == "accepted"

@@ -22,7 +22,7 @@ from harness.engines.registry import Registered
 from harness.engines.urdf_pinocchio import UrdfPinocchio
 from harness.engines.urdf_yourdfpy import UrdfYourdfpy
 from harness.errors import InputError
-from harness.report import source_parts as parts
+from harness.report import tested_parts as parts
 from harness.report.document import Report, Source
 from harness.report.json_file import to_json
 from harness.run.described import described
@@ -190,6 +190,7 @@ def test_yourdfpy_ignores_small_steps(models: dict[str, RobotModel], monkeypatch
     report = crosscheck(models["humanoid_arm"], options)
     tested = own_test(report, "urdf:yourdfpy")
     assert (tested.problem, report.verdict.exit_code, tested.ignored_step) == ("", 0, 1e-8)
+    assert 2000 < tested.configurations < 2500  # and it is slow
     assert 1e-9 < max(tested.position, tested.rotation) < 1e-7
     monkeypatch.setattr(UrdfYourdfpy, "ignored_step", 0.0)
     bare = crosscheck(models["humanoid_arm"], options)
