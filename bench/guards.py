@@ -2,7 +2,7 @@
 
     python bench/guards.py [WORD ...] [--jobs N]
 
-The guards are in bench/guards.toml. A WORD chooses those whose item, name or file it is, or is part of. Exit code 1 if the
+The guards are in bench/guards.toml. A WORD chooses those whose item it is, or part of whose name or file. Exit code 1 if the
 tests fail with all guards in their places, if one is not caught, or if the text of one is not there any more.
 """
 
@@ -44,7 +44,9 @@ class Guard:
 
     def is_meant(self, words: list[str]) -> bool:
         """Whether it is one of those asked for; all are, if there are no words."""
-        return not words or any(word == str(self.item) or word in self.name or word in self.file for word in words)
+        return not words or any(
+            word == str(self.item) if word.isdigit() else word in self.name or word in self.file for word in words
+        )
 
 
 def guards() -> list[Guard]:

@@ -262,8 +262,7 @@ def _command(folder: Path, models: Path | None, options: Options) -> str:
     words += ["--probe-seed", str(options.probe_seed)] if options.probe_seed and options.certify else []
     flags = {"--no-certify": not options.certify, "--no-explain": not options.explain, "--strict": options.strict}
     words += [flag for flag, wanted in flags.items() if wanted]
-    # A path need not be text; the report is.
-    return command_line(words).encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+    return command_line(words)
 
 
 def _print(report: Report, settings: RunSettings) -> None:
