@@ -9,17 +9,21 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from harness import kernels, se3
 from harness.comparison.statistics import Stream
+from harness.description.model import RobotModel
 from harness.digits import anchored, as_fine_as, coordinate, discrepancy, lower_bound, upper_bound
+from harness.engines.registry import adapter_of
 from harness.report.parts import Discrepancy
 from harness.report.pose import FramePair
 from harness.report.proof_parts import FrameBound
 from harness.report.source_parts import Statistics, Validity
+from harness.workers.pool import Workers
 
 SIZES = st.floats(1e-18, 1e6)
 
@@ -152,8 +156,7 @@ def test_jobs_threads_hash_seed_and_kernels_of_the_command(
     assert documents[0] == documents[1]
 
 
-def test_the_command_and_its_workers_have_fixed_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever the caller's environment says: numbers are not to depend on it."""
+def test_kernels_are_fixed_whatever_the_environment_says(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("platform.machine", lambda: "x86_64")
     environ = {"OPENBLAS_CORETYPE": "Zen", "PATH": "/bin"}
     kernels.fix_kernels(environ)
@@ -162,3 +165,33 @@ def test_the_command_and_its_workers_have_fixed_kernels(monkeypatch: pytest.Monk
     }  # fmt: skip
     monkeypatch.setattr("platform.machine", lambda: "riscv64")
     assert "OPENBLAS_CORETYPE" not in kernels.kernels()
+
+
+COMMAND = """
+import os, sys
+sys.argv = ["crosscheck", "frames", "sixr"]
+from harness.__main__ import main
+assert "numpy" not in sys.modules
+try:
+    main()
+finally:
+    assert "numpy" in sys.modules
+    print(os.environ["MKL_CBWR"], file=sys.stderr)
+"""
+
+
+def test_the_command_has_fixed_kernels_before_numpy_is_there() -> None:
+    env = {**os.environ, "MKL_CBWR": "AVX2"}
+    done = subprocess.run([sys.executable, "-c", COMMAND], env=env, capture_output=True, text=True, timeout=120, check=True)
+    assert done.stderr == "COMPATIBLE\n"
+
+
+def test_workers_have_fixed_kernels(monkeypatch: pytest.MonkeyPatch, models: dict[str, RobotModel]) -> None:
+    """Those of the API too, whose own process may have other kernels."""
+    monkeypatch.setenv("MKL_CBWR", "AVX2")
+    model = models["sixr"]
+    assert model.urdf is not None
+    with Workers() as workers:
+        workers.load(adapter_of("urdf:pinocchio"), model.urdf, model.urdf.links)
+        running = [child for child in psutil.Process().children(recursive=True) if "worker.py" in " ".join(child.cmdline())]
+        assert "COMPATIBLE" in {child.environ().get("MKL_CBWR") for child in running}

@@ -259,11 +259,24 @@ def test_a_spoilt_one_is_dropped(
     assert capsys.readouterr().err.endswith("does not fit: it is damaged, or was not written here\n")
 
 
-def test_one_that_came_from_elsewhere_is_dropped(ur5: RobotModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("has_a_key", [False, True])
+def test_one_that_came_from_elsewhere_is_dropped(
+    ur5: RobotModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, has_a_key: bool
+) -> None:
     """A file in a repository could else say that a table agrees."""
     run(ur5, tmp_path, 20018)
     monkeypatch.setenv("FK_CROSSCHECK_CACHE", str(tmp_path / "another user"))
+    if has_a_key:
+        module._key(make=True)
     assert run(ur5, tmp_path)[1] == BLOCKS
+
+
+def test_one_that_a_link_leads_to_is_not_read(ur5: RobotModel, tmp_path: Path) -> None:
+    run(ur5, tmp_path, 12288)
+    kept(tmp_path).rename(tmp_path / "cache" / "elsewhere")
+    kept(tmp_path).symlink_to("cache/elsewhere")
+    assert run(ur5, tmp_path)[1] == BLOCKS
+    assert (tmp_path / "cache" / "elsewhere").exists()
 
 
 @pytest.mark.parametrize("kind", ["folder", "pipe", "link"])

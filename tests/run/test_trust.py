@@ -245,6 +245,11 @@ def test_what_changes_the_fingerprint(stranger: Path, tmp_path: Path) -> None:
     (stranger / "link").unlink()
     (stranger / "link").symlink_to("tool.py")
     assert changed()
+    for name in ("one", "two"):  # a link to a folder: what is in it is not looked at
+        (tmp_path / name).mkdir()
+        (stranger / "folder").unlink(missing_ok=True)
+        (stranger / "folder").symlink_to(f"../../{name}")
+        assert changed()
     (stranger / "__pycache__").mkdir()
     (stranger / "__pycache__" / "numpy.cpython-311.pyc").write_bytes(b"1")
     assert changed()
