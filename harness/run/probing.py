@@ -42,7 +42,7 @@ def probe_all(run: Run, workers: Workers) -> None:
     compared = configurations.block(run.options.seed, 0, min(SUBSET, total_of(run)))
     descriptions = {kind: described(run.model, kind, run.rigid_transforms) for kind in ("dh", "urdf")}
     names = [frame.name for frame in run.model.frames.frames]
-    running = [o for o in run.outcomes if o.bound is not None and o.bound.view.available]
+    running = [o for o in run.outcomes if o.bound is not None and o.bound.view.available and not _died(o.bound)]
     sizes = {o.name: SLOW_BLOCK if _is_slow(o) else MAX_BLOCK for o in running}
     probes = {rows: draw(run.model, compared, run.options.probe_seed, rows) for rows in {*sizes.values()}}
     tasks: list[tuple[Outcome, Future[Tested]]] = []
@@ -56,6 +56,11 @@ def probe_all(run: Run, workers: Workers) -> None:
             run.take_out(outcome, failure.error, f"(tested against its own description: {failure.kind})")
     for outcome in run.compared:
         _withdraw(run, outcome)
+
+
+def _died(bound: Bound) -> bool:
+    """Whether the process of an engine has come to an end."""
+    return isinstance(bound.engine, ProcessEngine) and bool(bound.engine.died)
 
 
 def _is_slow(outcome: Outcome) -> bool:
@@ -100,8 +105,7 @@ class _Asker:
             try:
                 return self._bound.raw(q), np.ones(len(q), dtype=bool)
             except Exception as error:  # an engine may refuse what is beyond its limits
-                engine = self._bound.engine
-                if inside.all() or (isinstance(engine, ProcessEngine) and engine.died):
+                if inside.all() or _died(self._bound):
                     raise
                 self.refused = str(getattr(error, "reason", "") or f"{type(error).__name__}: {error}")
         T = np.full((len(q), len(self._bound.frames), 4, 4), np.nan)
