@@ -48,6 +48,8 @@ def lower_bound(x: float) -> float:
 
 def measured_bounds(lower: float, upper: float) -> tuple[float, float]:
     """Both of a frame whose offset an engine has measured, to 1e-13 outwards: the offset is not known better."""
+    if not math.isfinite(upper):
+        return lower, upper
     low, high = (round(f(x / MEASURED) * MEASURED, 13) for f, x in ((math.floor, lower), (math.ceil, upper)))
     return low, high
 

@@ -12,6 +12,7 @@ from harness.cause.explain import Explanation
 from harness.description.dh import Convention
 from harness.difference.operands import Operand
 from harness.difference.remarks import remarks
+from harness.digits import discrepancy
 from harness.errors import ExitCode
 from harness.kinematics.invariants import Matching
 from harness.kinematics.side_by_side import COLUMNS, Side, Unit, difference_of, with_matching_normals
@@ -115,7 +116,7 @@ class Difference:
         word, kind = ("SAME", "same") if self.same else ("DIFFERENT", "different")
         if self.theorem.is_equal:
             return Line(plain(f"{word} {self.a.label} and {self.b.label}: equal at every configuration (proven)"), kind)
-        seen = f"up to {metres(self.largest.position)}, {radians(self.largest.rotation)} apart"
+        seen = f"up to {metres(discrepancy(self.largest.position))}, {radians(discrepancy(self.largest.rotation))} apart"
         slides = [f"{joint} from {low:g} to {high:g} m" for joint, (low, high) in self.theorem.ranges.items()]
         where = f"for all q{' with ' if slides else ''}{', '.join(slides)}"
         bound = self.bound
@@ -135,8 +136,8 @@ class Difference:
                 yield Line(plain(f"         the same: {'; '.join(c.text for c in others[:MOST_EQUIVALENTS])}"))
         for text in remarks(e):
             yield Line(plain(f"  note: {text}"))
-        after = f"{metres(e.after[0])}, {radians(e.after[1])} after"
-        yield Line(f"  tried: {metres(e.before[0])}, {radians(e.before[1])} before, {after}")
+        before, after = (f"{metres(discrepancy(x))}, {radians(discrepancy(y))}" for x, y in (e.before, e.after))
+        yield Line(f"  tried: {before} before, {after} after")
 
     def notes(self) -> Iterator[Line]:
         """What stands above the table: why there is none, or what its columns are."""

@@ -273,9 +273,9 @@ def test_render(cli: Cli, tmp_path: Path) -> None:
         ("[]", "expected a document with"),
         (
             '{"format": "fk-crosscheck report", "version": "9.0"}',
-            "expected report version 1.3, got '9.0'; run the cross-check again",
+            "expected report version 1.4, got '9.0'; run the cross-check again",
         ),
-        ('{"format": "fk-crosscheck report", "version": "1.3"}', "robot: not a report: Field required"),
+        ('{"format": "fk-crosscheck report", "version": "1.4"}', "robot: not a report: Field required"),
     ],
 )
 def test_render_what_is_no_report(cli: Cli, tmp_path: Path, text: str, message: str) -> None:
