@@ -67,7 +67,7 @@ def generated(number: int) -> dict[str, Any]:
             "name": f"robot{number}",
             "description": "a random arm",
             "convention": source.choice(["standard", "modified"]),
-            "gate": source.choice(["sampled", "certified"]),
+            "gate": source.choice(["sampled", "sampled", "sampled", "certified"]),
             "provenance": {"document": "none"},
             "tolerance": {"position": 1e-9, "rotation": 1e-9},
             "source": [{"name": "dh:pinocchio"}],

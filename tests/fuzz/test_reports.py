@@ -25,7 +25,7 @@ from tests.helpers import copied, crosscheck
 
 # A run costs more than reading a report. Whether it looks at the damaged file does not depend on the robot: a small one does.
 COMMANDS = (*["render"] * 8, *["accept"] * 4, "index", "accepted numbers", "accepted numbers, strict")
-SMALL = 0  # a random model of few joints
+SMALL = 4  # a random model of few joints
 KINDS = ("agrees", "wrong number", "wrong base", "engine missing", "small")
 
 
