@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -19,6 +21,10 @@ from tests.helpers import copied, shared_workers
 # In CI the same examples every time: a rare one found there would fail a change that did not cause it.
 settings.register_profile("default", deadline=None, max_examples=50, derandomize=bool(os.environ.get("CI")))
 settings.load_profile("default")
+
+# A process of pytest-xdist ignores Ctrl-C, and so would every program that a test starts and interrupts.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN and threading.current_thread() is threading.main_thread():
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Engines a run of the tests does without, said aloud by whoever runs them (nox -s matrix); any other must be installed.
 WITHOUT = set(filter(None, os.environ.get("CROSSCHECK_TESTS_WITHOUT", "").split(",")))
