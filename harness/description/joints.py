@@ -269,6 +269,12 @@ def random_limits(table: DHTable, urdf: Urdf | None, joint_map: JointMap | None)
     return ranges
 
 
+def within_travel(lower: Array, upper: Array) -> tuple[Array, Array]:
+    """Ranges (...) [m] cut to `TRAVEL` each way from their point nearest to zero: limits of kilometres mean none."""
+    nearest = np.clip(0.0, lower, upper)
+    return np.maximum(lower, nearest - TRAVEL), np.minimum(upper, nearest + TRAVEL)
+
+
 def _sane(lower: float, upper: float) -> tuple[float, float]:
     """The range of a slide; an end that means none, such as 999999 m, is taken as 10 m from where the other one lets it begin."""
     nearest = min(max(0.0, lower), upper)

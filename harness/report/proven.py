@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from harness.report.document import Source
-from harness.report.proof_parts import Theorem
+from harness.report.proof_parts import FrameBound, Theorem
 from harness.report.text import metres, radians
 
 
@@ -18,7 +18,7 @@ def proven_text(theorem: Theorem, frames: Collection[str]) -> str:
     if not bounds:
         return ""
     words = {theorem.equality[bound.frame] for bound in bounds}
-    position, rotation = (max(getattr(b, f"{what}_upper") for b in bounds) for what in ("position", "rotation"))
+    position, rotation = _largest(bounds)
     where = f"at every configuration{_slides(theorem)} (proven)"
     if words == {"equal"}:
         return "the table and the URDF are equal at every configuration (proven)"
@@ -30,8 +30,13 @@ def at_most(theorem: Theorem) -> str:
     """`table and URDF at most 1.2e-11 m, 8.2e-11 rad apart`, at any frame; or that they are equal."""
     if theorem.is_equal:
         return "table and URDF are equal"
-    position, rotation = (max(getattr(b, f"{what}_upper") for b in theorem.frames) for what in ("position", "rotation"))
+    position, rotation = _largest(theorem.frames)
     return f"table and URDF at most {metres(position)}, {radians(rotation)} apart"
+
+
+def _largest(bounds: Collection[FrameBound]) -> tuple[float, float]:
+    """The largest of some bounds: position [m], rotation [rad]."""
+    return max(b.position_upper for b in bounds), max(b.rotation_upper for b in bounds)
 
 
 def _slides(theorem: Theorem) -> str:
@@ -48,6 +53,5 @@ def for_all(source: Source) -> str:
         return ""
     if source.certificate.status == "refused":
         return "not claimed"
-    position = max(bound.position_upper for bound in source.certificate.frames)
-    rotation = max(bound.rotation_upper for bound in source.certificate.frames)
+    position, rotation = _largest(source.certificate.frames)
     return f"<= {metres(position)}" if position or rotation else "equal"

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.description.configurations import ConfigurationSet
+from harness.description.joints import within_travel
 from harness.description.model import RobotModel
 from harness.run.grids import GRID_LIMIT, axes_of, grid
 from harness.se3 import Array
@@ -28,7 +29,6 @@ KINDS = (COMPARED, FULL, SINGLE, STEPS, AGAIN, SPECIAL, GRID, FAR)  # in the ord
 
 TURN = 2.0 * math.pi
 TURNS = 25  # each way, of the far ones
-TRAVEL = 10.0  # [m] each way: how far a slide goes that has no sane range
 STREAM = 1 << 62  # the random configurations of a run take the streams from 0 on
 MOST_JOINTS = 16  # that are looked at one by one
 SLOW_BLOCK = MAX_BLOCK // 2  # rows of the full block of a slow engine
@@ -80,10 +80,10 @@ class Box:
     def of(cls, law: ConfigurationSet) -> Box:
         """The box of a model's joints."""
         revolute = np.array(law.revolute, dtype=bool)
-        nearest = np.clip(0.0, law.lower, law.upper)
+        lower, upper = within_travel(law.lower, law.upper)
         return cls(
-            lower=np.where(revolute, np.minimum(law.lower, -TURN), np.maximum(law.lower, nearest - TRAVEL)),
-            upper=np.where(revolute, np.maximum(law.upper, TURN), np.minimum(law.upper, nearest + TRAVEL)),
+            lower=np.where(revolute, np.minimum(law.lower, -TURN), lower),
+            upper=np.where(revolute, np.maximum(law.upper, TURN), upper),
             limits=(np.minimum(law.lower, law.fixed_q.min(axis=0)), np.maximum(law.upper, law.fixed_q.max(axis=0))),
             revolute=revolute,
         )

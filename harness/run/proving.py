@@ -10,14 +10,13 @@ import math
 
 import numpy as np
 
+from harness.description.joints import within_travel
 from harness.description.model import RobotModel
 from harness.engines.registry import kind_of
 from harness.run.outcome import Certified, Outcome, Run
 from harness.theorem.descriptions import of_model
 from harness.theorem.prove import FrameBound
 from harness.theorem.statement import theorem
-
-SLIDE = 10.0  # [m] each way: how far a slide is looked at that has no sane range
 
 
 def prove_all(run: Run) -> None:
@@ -32,17 +31,17 @@ def prove_all(run: Run) -> None:
 def slides_of(model: RobotModel) -> dict[str, tuple[float, float]]:
     """The range of each joint that slides something, lower and upper end [m, or rad of one that turns and slides].
 
-    Its limits, and what fixed configurations take; cut to 10 m each way from the point that is nearest to zero: limits of
-    kilometres mean none.
+    Its limits, and what fixed configurations take; those of a slide within `joints.TRAVEL`.
     """
     law, ranges = model.configurations, {}
+    lowest = np.minimum(law.lower, law.fixed_q.min(axis=0, initial=math.inf))
+    highest = np.maximum(law.upper, law.fixed_q.max(axis=0, initial=-math.inf))
+    lower, upper = within_travel(lowest, highest)
     for j, joint in enumerate(model.table.joints):
         slides = model.table.kind(joint) == "prismatic"
         if slides or _drives_a_slide(model, j):
-            lower = min(float(law.lower[j]), float(law.fixed_q[:, j].min(initial=math.inf)))
-            upper = max(float(law.upper[j]), float(law.fixed_q[:, j].max(initial=-math.inf)))
-            nearest = float(np.clip(0.0, lower, upper))
-            ranges[joint] = (max(lower, nearest - SLIDE), min(upper, nearest + SLIDE)) if slides else (lower, upper)
+            ends = (lower[j], upper[j]) if slides else (lowest[j], highest[j])
+            ranges[joint] = (float(ends[0]), float(ends[1]))
     return ranges
 
 

@@ -101,6 +101,11 @@ def onto(axis: Axis) -> list[list[Ball]]:
     return [[x[i], y[i], z[i]] for i in range(3)]
 
 
+def aligned(axis: Axis) -> Matrix:
+    """The same as a transform (4, 4) that moves nothing."""
+    return rigid(onto(axis), [flint.arb(0)] * 3)
+
+
 def turned(axis: Axis, angle: Exact) -> Matrix:
     """The rotation (4, 4) by an angle about an axis of any length."""
     s, c = sincos(angle)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TypeAlias
@@ -72,6 +72,10 @@ class Chains:
 
     joints: tuple[str, ...]
     paths: Mapping[str, Path]
+
+    def only(self, names: Iterable[str]) -> Chains:
+        """The description at some of its frames."""
+        return Chains(self.joints, {name: self.paths[name] for name in names})
 
     def slides(self, joint: int) -> bool:
         """Whether a joint, by its index, slides something, whatever else it does."""

@@ -57,7 +57,7 @@ def equal(a: Chains, b: Chains) -> dict[str, bool]:
         return dict.fromkeys(names, False)
     bits = max(field.bits for field in decidable.values())
     with precision(bits + 4 * MARGIN):
-        both = [Chains(c.joints, {name: c.paths[name] for name in decidable}) for c in (a, b)]
+        both = [c.only(decidable) for c in (a, b)]
         pair = Pair.of(both[0], both[1], np.zeros((len(a.joints), 2)))
         return {name: name in decidable and _equal(pair, both, name, decidable[name]) for name in names}
 
@@ -65,7 +65,7 @@ def equal(a: Chains, b: Chains) -> dict[str, bool]:
 def _equal(pair: Pair, both: list[Chains], name: str, field: Field) -> bool:
     """Joint by joint, by constants, if both have the same joints; else both chains are multiplied out."""
     separation = flint.arb(2) ** -field.bits
-    end = pair.deviation(name)
+    end = pair.deviations[name]
     if end is not None:
         E, joints = end.E, len(end.residuals)
         left = [x for residual in end.residuals for x in residual.entries]

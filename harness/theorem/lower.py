@@ -9,7 +9,7 @@ from typing import NamedTuple
 import flint
 
 from harness.se3 import Array
-from harness.theorem.balls import Ball, Matrix, identity
+from harness.theorem.balls import Ball, Matrix, ball, identity
 from harness.theorem.normal import Line, Motion
 
 
@@ -38,7 +38,7 @@ class At:
         return T * line.tail
 
     def _motion(self, motion: Motion) -> Matrix:
-        terms = [flint.arb(flint.fmpq(x.numerator, x.denominator)) * q for x, q in zip(motion.row, self._exact, strict=True) if x]
+        terms = [ball(x) * q for x, q in zip(motion.row, self._exact, strict=True) if x]
         amount = sum(terms, flint.arb(0))
         T = identity()
         if motion.turns:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import flint
 
-from harness.theorem.balls import Matrix, identity, onto, rigid
+from harness.theorem.balls import Matrix, aligned, identity
 from harness.theorem.chain import Chains, Path, Row, Step
 
 
@@ -69,7 +69,7 @@ def _line(path: Path, known: dict[Step, tuple[Motion, Matrix]]) -> Line:
 def _motion(step: Step, parent: Motion | None, before: Matrix) -> tuple[Motion, Matrix]:
     """A step as a motion about z, and the constant transform that follows it."""
     upright = step.upright()
-    A = rigid(onto(upright.axis), [flint.arb(0)] * 3)
+    A = aligned(upright.axis)
     row = upright.row
     if next(x for x in row if x) < 0:
         A = A * flint.arb_mat([[1, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1]])

@@ -69,19 +69,20 @@ class Pair:
     def of(cls, a: Chains, b: Chains, ranges: Array) -> Pair:
         """The pair of two descriptions, at the frames that both have."""
         names = tuple(name for name in a.paths if name in b.paths)
-        both = [Chains(c.joints, {name: c.paths[name] for name in names}) for c in (a, b)]
+        both = [c.only(names) for c in (a, b)]
         return cls(names=names, a=normal(both[0]), b=normal(both[1]), ranges=ranges, scales=scales_of(both))
 
-    def deviation(self, name: str) -> Deviation | None:
-        """What is left at a frame when all that commutes has moved to its end; None if the joints are not the same."""
-        return self._gauge.at_end(self.a[name], self.b[name])
+    @cached_property
+    def deviations(self) -> dict[str, Deviation | None]:
+        """What is left at each frame when all that commutes has moved to its end; None if the joints are not the same."""
+        return {name: self._gauge.at_end(self.a[name], self.b[name]) for name in self.names}
 
     def by_joints(self, name: str) -> tuple[tuple[float, float], tuple[bool, bool]]:
         """Bounds by constants alone: position [m], chord; and for each whether the discrepancy is the same everywhere.
 
         Infinite if both chains do not have the same joints in the same order.
         """
-        end = self.deviation(name)
+        end = self.deviations[name]
         if end is None:
             return (math.inf, math.inf), (False, False)
         own, left = size_of(end.E), carried(end, reaches(self.a[name], self.ranges))
@@ -91,7 +92,7 @@ class Pair:
 
     def slope(self, name: str) -> float | None:
         """Upper bound on how fast the position's discrepancy grows with the slides, by constants alone [m/m]."""
-        end, slope, chord = self.deviation(name), 0.0, 0.0
+        end, slope, chord = self.deviations[name], 0.0, 0.0
         if end is None:
             return None
         for motion, residual in zip(self.a[name].motions, end.residuals, strict=True):
@@ -166,10 +167,6 @@ class Pair:
     def tries(self) -> list[At]:
         """Configurations at which every frame is looked at, always the same."""
         return [At(q) for q in self._some(TRIED)]
-
-    def middle(self) -> Array:
-        """A configuration at which nothing in particular happens, (n,)."""
-        return np.asarray(self.ranges.mean(axis=1))
 
     def inside(self, q: Array) -> Array:
         """q (n,) with every joint that has a range moved into it."""

@@ -13,7 +13,7 @@ from typing import TypeAlias
 
 import flint
 
-from harness.theorem.balls import Ball, Matrix, ball, identity, onto, rigid
+from harness.theorem.balls import Ball, Matrix, aligned, ball, identity
 from harness.theorem.chain import Step
 
 # Frequencies of the joints as whole numbers of `1 / scale`, then the joint that the term is linear in, or -1.
@@ -69,7 +69,7 @@ class Polynomial:
             self.pending = self.pending * step.constant
             return
         step = step.upright()
-        A = rigid(onto(step.axis), [flint.arb(0)] * 3)
+        A = aligned(step.axis)
         self.pending = self.pending * step.constant * A
         if step.turns:
             self._turn(tuple(int(x * s) for x, s in zip(step.row, self.scales, strict=True)))

@@ -8,7 +8,6 @@ docs/theory.md has the proofs.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
@@ -161,8 +160,3 @@ def _sharp(pair: Pair, name: str, part: _Part, function: Coefficients | None, ef
             return part
     bound, top = sharpened(function, part.found, effort.nodes)
     return _Part(bound, top, "grid") if bound < part.upper else replace(part, found=top)
-
-
-def largest(bounds: Sequence[FrameBound]) -> tuple[float, float]:
-    """The largest bounds of several frames: position [m], rotation [rad]."""
-    return max((b.position for b in bounds), default=0.0), max((b.rotation for b in bounds), default=0.0)

@@ -9,7 +9,6 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from harness.description.written import angle_of
-from harness.se3 import Array
 from harness.theorem.chain import Chains, Path, Step
 from harness.theorem.equality import equal
 from harness.theorem.prove import Effort, FrameBound, prove
@@ -74,15 +73,11 @@ def _equality(a: Chains, b: Chains, bounds: Mapping[str, FrameBound]) -> dict[st
     apart = {name for name, bound in bounds.items() if bound.position_found > 0.0 or bound.rotation_found > 0.0}
     close = [name for name, bound in bounds.items() if max(bound.position, bound.rotation) < CLOSE]
     words: dict[str, Equality] = {name: "not equal" if name in apart else "not decided" for name in bounds}
-    decided = equal(*(_only(c, [name for name in close if name not in apart]) for c in (a, b)))
+    decided = equal(*(c.only(name for name in close if name not in apart) for c in (a, b)))
     words |= {name: "equal" for name, same in decided.items() if same}
     rest = [name for name in close if words[name] != "equal"]
-    meant = equal(*(with_pi(_only(c, rest)) for c in (a, b)))
+    meant = equal(*(with_pi(c.only(rest)) for c in (a, b)))
     return words | {name: "equal but for the digits of pi" for name in rest if meant[name]}
-
-
-def _only(chains: Chains, names: list[str]) -> Chains:
-    return Chains(chains.joints, {name: chains.paths[name] for name in names})
 
 
 def _nothing(bound: FrameBound) -> FrameBound:
@@ -107,12 +102,3 @@ def with_pi(chains: Chains) -> Chains:
         return tuple(meant(step) for step in path)
 
     return Chains(chains.joints, {name: path_of(path) for name, path in chains.paths.items()})
-
-
-def slides_of(joints: tuple[str, ...], prismatic: tuple[bool, ...], limits: Array) -> dict[str, tuple[float, float]]:
-    """The ranges of the joints that slide, from limits (n, 2) [m] of all joints."""
-    return {
-        joint: (float(lower), float(upper))
-        for joint, slides, (lower, upper) in zip(joints, prismatic, limits, strict=True)
-        if slides
-    }
