@@ -117,7 +117,8 @@ class Difference:
         if self.theorem.is_equal:
             return Line(plain(f"{word} {self.a.label} and {self.b.label}: equal at every configuration (proven)"), kind)
         seen = f"up to {metres(discrepancy(self.largest.position))}, {radians(discrepancy(self.largest.rotation))} apart"
-        slides = [f"{joint} from {low:g} to {high:g} m" for joint, (low, high) in self.theorem.ranges.items()]
+        units = {joint: "m" if slides else "rad" for joint, slides in zip(self.a.joints, self.a.prismatic, strict=True)}
+        slides = [f"{joint} from {low:.3g} to {high:.3g} {units[joint]}" for joint, (low, high) in self.theorem.ranges.items()]
         where = f"for all q{' with ' if slides else ''}{', '.join(slides)}"
         bound = self.bound
         proven = f"{where} at most {metres(bound.position)}, {radians(bound.rotation)} (proven)" if bound else "nothing is proven"

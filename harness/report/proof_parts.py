@@ -28,10 +28,11 @@ class FrameBound(Part):
 
 
 class Range(Part):
-    """Lower and upper end of a joint that slides [m]."""
+    """Lower and upper end of a joint that slides something; in radians if it turns something too."""
 
     lower: Finite
     upper: Finite
+    unit: Literal["m", "rad"] = "m"
 
 
 class Theorem(Part):

@@ -40,7 +40,7 @@ def _largest(bounds: Collection[FrameBound]) -> tuple[float, float]:
 
 
 def _slides(theorem: Theorem) -> str:
-    ranges = [f"{joint} from {r.lower:g} to {r.upper:g} m" for joint, r in theorem.slides.items()]
+    ranges = [f"{joint} from {r.lower:g} to {r.upper:g} {r.unit}" for joint, r in theorem.slides.items()]
     return f" with {', '.join(ranges)}" if ranges else ""
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 from harness.cause.changes import Change
 from harness.description.configurations import ConfigurationSet
@@ -40,8 +40,13 @@ def theorem(run: Run) -> proofs.Theorem | None:
         frames=[_bound(run, name, bound) for name, bound in run.theorem.frames.items()],
         equality={n: "offset measured" if n in run.offsets else word for n, word in run.theorem.equality.items()},
         worst={n: b.worst[0].tolist() for n, b in run.theorem.frames.items() if b.position_found > WORTH_TELLING},
-        slides={joint: proofs.Range(lower=lower, upper=upper) for joint, (lower, upper) in run.theorem.ranges.items()},
+        slides={joint: _range(run, joint, ends) for joint, ends in run.theorem.ranges.items()},
     )
+
+
+def _range(run: Run, joint: str, ends: tuple[float, float]) -> proofs.Range:
+    unit: Literal["m", "rad"] = "m" if run.model.table.kind(joint) == "prismatic" else "rad"
+    return proofs.Range(lower=ends[0], upper=ends[1], unit=unit)
 
 
 def _bound(run: Run, frame: str, bound: FrameBound) -> proofs.FrameBound:

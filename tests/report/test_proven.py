@@ -26,6 +26,11 @@ def test_a_bound_names_the_range_of_the_slides() -> None:
     )
 
 
+def test_the_range_of_a_joint_that_turns_and_slides_is_an_angle() -> None:
+    text = proven_text(theorem("not equal", 2e-3, {"screw": Range(lower=-3.0, upper=3.0, unit="rad")}), ["tip"])
+    assert "with screw from -3 to 3 rad (proven)" in text
+
+
 def test_equal_descriptions_are_so_whatever_the_range() -> None:
     text = proven_text(theorem("equal", 0.0, {"lift": Range(lower=0.0, upper=1.5)}), ["tip"])
     assert text == "the table and the URDF are equal at every configuration (proven)"
